@@ -123,7 +123,7 @@ def _blurred(values):
 
 
 def _grown(mask, pixels):
-    """Return a mask and what is this close to it."""
+    """Return a mask grown by a number of pixels."""
     for _step in range(pixels):
         mask = mask | np.roll(mask, 1, 0) | np.roll(mask, -1, 0) | np.roll(mask, 1, 1) | np.roll(mask, -1, 1)
     return mask

@@ -78,7 +78,7 @@ def apply_layers(guides: Curves) -> int:
 
 
 def _target(guides):
-    """Return guide Curves whose edited points are recorded."""
+    """Record the edited points of guides in their layers and return the guides' Curves."""
     target = blender.data.arguments.guides_of(guides)
     blender.layers.recording.update(target, blender.data.scene.present_depsgraph())
     return target

@@ -54,7 +54,7 @@ PARTS = {
     "drawing": (Frame, "draw"),
 }
 _WITHIN = {"guides' upload": "strands", "pose": "strands"}
-_NESTED = {"shadows": ("visibility", "all of it")}  # which draw maps of their own
+_NESTED = {"shadows": ("visibility", "all of it")}  # both draw their own maps
 
 
 class Editing:

@@ -27,7 +27,7 @@ STYLES = {
     "curl": (curl.Settings(),),
     "clump, curl": (clump.Settings(levels=1), curl.Settings()),
     "frizz": (frizz.Settings(),),
-    "braid": (braid.Settings(),),  # whose profile begins steeply, at one of the points: rounding is seen there first
+    "braid": (braid.Settings(),),  # its profile begins steeply at a point, where rounding shows first
     "all three": (clump.Settings(levels=1), curl.Settings(), frizz.Settings()),
 }
 STRANDS_A_LOCK = 60

@@ -18,7 +18,7 @@ from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from tests.support.meshes import flat_grid
 from tests.support.strands.hair import generate_hair
 
-FACTOR = 3.0  # that a ratio between two sizes may be off by
+FACTOR = 3.0  # largest error of a ratio between two sizes
 
 
 def hills(side_count):

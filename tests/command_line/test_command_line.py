@@ -38,7 +38,7 @@ def shot(lit, tmp_path):
         sphere.rotation_euler = (0.0, angle, angle)
         sphere.keyframe_insert("rotation_euler", frame=frame)
     scene.frame_end, scene.cycles.samples, scene.eevee.taa_render_samples = 3, 1, 1
-    scene.eevee.use_shadows = False  # which take it half of its time
+    scene.eevee.use_shadows = False  # shadows take half of its time
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 80, 60, 50
     scene.frame_set(2)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))

@@ -195,7 +195,7 @@ def test_long_lists_are_shortened():
     assert rendered_files.in_short(list("abcdefg")) == "a, b, c, d + 3"
 
 
-# Libraries: a chair in a.blend, whose mesh is in b.blend, in a shot.
+# Libraries: a shot links a chair from a.blend, and the mesh of the chair is linked from b.blend.
 
 _LINKS = """
 import sys, bpy

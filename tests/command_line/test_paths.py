@@ -13,7 +13,7 @@ from hair_addon.core.imaging import picture_checks
 from tests.blender.io.test_sequence import turning  # noqa: F401 (a fixture)
 from tests.support.commands import HEAD, run_here
 
-FOLDER = "vellus_beside"  # which must not appear at the root of the disk
+FOLDER = "vellus_beside"  # must not appear at the root of the disk
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ def test_blender_renders_the_hair(lit, engine, tmp_path):
     scene.render.resolution_x = scene.render.resolution_y = PIXELS
     scene.render.film_transparent, scene.view_settings.view_transform = True, "Standard"
     scene.cycles.samples, scene.eevee.taa_render_samples = 8, 4
-    scene.eevee.use_shadows = False  # which take it half of its time
+    scene.eevee.use_shadows = False  # shadows take half of its time
     scene.render.filepath = str(tmp_path / "hair.png")
     bpy.ops.render.render(write_still=True)
     picture = np.array(bpy.data.images.load(scene.render.filepath).pixels).reshape(PIXELS, PIXELS, 4)

@@ -25,7 +25,7 @@ def take(steps, pause=0.05, at_the_end=None):
     """Take steps once Blender has its window, and end Blender after the last of them, or the first that fails.
 
     steps: functions that yield where Blender may handle its events and redraw, for `pause` seconds and more.
-    at_the_end: what is called before Blender ends, on every way out.
+    at_the_end: function that is called before Blender ends, also after a failure.
     """
     bpy.context.preferences.view.show_splash = False  # before it is shown: it would take the first click
     taking = _take(steps)

@@ -144,7 +144,7 @@ def grow(place):
     for style in ("CURL", "FRIZZ"):
         bpy.context.view_layer.objects.active = hair
         bpy.ops.vellus.add_style(style=style)
-    style_items.group_of(hair.data.vellus.styles[1]).coherence = 0.5  # which the place on the surface counts for
+    style_items.group_of(hair.data.vellus.styles[1]).coherence = 0.5  # noise then depends on the place on the surface
     comb(guides)
     uses = {"Kept": bpy.ops.vellus.use_as_hair, "Made": lambda: bpy.ops.vellus.use_as_guides(grows_hair=False)}
     for name, use in uses.items():

@@ -394,7 +394,7 @@ def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
     """Return (world to view, view to clip), each (4, 4) float64, of a camera, by default the scene's, for a picture
     size.
 
-    eye: (matrix, horizontal shift) of a view of a stereo picture; None: those of the camera. Raises `HairError`.
+    eye: (matrix, horizontal shift) of a view of a stereo picture; None: the camera's own. Raises `HairError`.
     """
     camera = camera or scene.camera
     if camera is None:

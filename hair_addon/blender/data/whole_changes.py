@@ -29,7 +29,7 @@ _open: list["_Change"] = []  # running changes, the outermost first; empty betwe
 
 
 def whole(work: Callable[P, Work[T]]) -> Callable[P, Work[T]]:
-    """Decorate work in steps: it leaves nothing behind if it fails or is stopped.
+    """Decorate work in steps so that it is undone completely if it fails or is stopped.
 
     The work may change the objects and Curves among its arguments, and their surfaces.
     """

@@ -37,7 +37,7 @@ class DisplayTransform:
 
     @classmethod
     def of(cls, scene, part=viewport_shading.ALL):
-        """Return the settings of a scene; part: those of them that Blender applies to a viewport."""
+        """Return the settings of a scene; part: which settings Blender applies to the viewport."""
         view = scene.view_settings
         look = "" if view.look == "None" else view.look
         space = bpy.data.colorspace.working_space

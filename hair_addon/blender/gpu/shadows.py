@@ -49,7 +49,7 @@ class ShadowMaps:
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, 2 * layer_count if is_wide else layer_count, "RGBA32F")
         self._in_compute = scene_programs.has_image_atomics() if in_compute is None else in_compute
-        self._sphere = None  # that maps were last aimed at
+        self._sphere = None  # bounding sphere that the maps were last aimed at
         self._views = {}  # index of a light outside of the hair → (inputs of `_aim`, view, members that it wrote)
         self._surfaces = {}  # layer → inputs that its surfaces were drawn with
         self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands

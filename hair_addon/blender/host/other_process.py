@@ -14,7 +14,7 @@ _PACKAGE = Path(__file__).resolve().parents[2]
 class OtherProcess:
     """A process that runs a command. Raises `OSError` if it cannot start.
 
-    arguments: those after the program's own; errors: `Path` of the file for what it prints as errors.
+    arguments: command line after the program's name; errors: `Path` of the file for its standard error output.
     """
 
     def __init__(self, arguments, errors):

@@ -71,7 +71,7 @@ def _guides(datablock):
 
 
 def _baked(guides):
-    """State of baked guides and what is outdated; None without baked frames."""
+    """State, missing frames and outdated parts of baked guides; None without baked frames."""
     frames = frame_folders.frames_of(guides)
     if frames is None or frames.manifest is None:
         return None

@@ -39,7 +39,7 @@ class LayersBefore:
 
 
 def read(guides: Curves | None, surface: Surface) -> LayersBefore | None:
-    """Return the `LayersBefore` of guides on a `Surface`; None if they have no layers."""
+    """Record the edits of guides on a `Surface` and return their `LayersBefore`; None if they have no layers."""
     if guides is None or not len(guides.vellus.layers) or not layer_attributes.has_base(guides):
         return None
     if not len(guides.curves) or attributes.is_from_library(guides):

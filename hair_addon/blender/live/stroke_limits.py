@@ -19,7 +19,7 @@ def begin(objects):
 
 
 def limited(guides, points, depsgraph):
-    """Return the points (N, 3) of combed guides within the limits, which are written; `points` if none is moved."""
+    """Limit the points (N, 3) of combed guides, write and return them; return `points` if none is moved."""
     former = reported.former_points_of(guides)
     if former is None or not _is_edited(guides):
         return points

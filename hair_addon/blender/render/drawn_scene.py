@@ -36,8 +36,8 @@ class DrawnScene:
     surface_visibility: list  # of `surfaces`, then of `clear`
     # session_uid of the object that a click on each hair selects; in a render `drawn_meshes.owner_of` the hair.
     owners: tuple = ()
-    hair_owners: tuple = ()  # owner of each hair as of a `scene_lights.Receiver`, in viewports
-    selected: tuple = ()  # whether that object is selected
+    hair_owners: tuple = ()  # owner of each hair, as in `scene_lights.Receiver`, in viewports
+    selected: tuple = ()  # whether the owner of each hair is selected
     instances: tuple = ()  # of hair, from `hair_places.read_instances`
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
     clear: tuple = ()  # visible clear surfaces, like `surfaces`
@@ -56,7 +56,7 @@ class DrawnScene:
 
 @dataclass(frozen=True, eq=False)
 class Blocker:
-    """A surface that blocks light. owner: as of a `scene_lights.Receiver`; source: its `DrawnMesh`, where light paths
+    """A surface that blocks light. owner: as in `scene_lights.Receiver`; source: its `DrawnMesh`, where light paths
     may be traced; is_seen: visible to cameras.
     """
 

@@ -66,7 +66,7 @@ def follow(depsgraph):
             of_group = before.get(key, values[key])
             for name, value in values[key].items():
                 if value != of_group[name] or (group, name) in new:
-                    setattr(group, name, value)  # whose `update` marks it
+                    setattr(group, name, value)  # its `update` marks the change
     return is_outdated
 
 

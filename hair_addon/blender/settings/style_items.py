@@ -82,7 +82,7 @@ def names_of(state):
 def make_names_readable(items, default_of):
     """Replace invalid UTF-8 bytes in names of a list, as in a damaged file: renaming such an item crashes Blender.
 
-    default_of: function of an item that returns the name of an item without any.
+    default_of: function that returns the default name of an item.
     """
     for item in items:
         if not text_of(item, "name"):

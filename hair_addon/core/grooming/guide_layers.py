@@ -169,7 +169,7 @@ def is_other(
 
 
 def _are_unequal(counts, points, others):
-    """Return (G,) bool: whether any number of the points (N, 3) of a guide differs from that of others."""
+    """Return (G,) bool: whether any coordinate of a guide's points (N, 3) differs from `others` (N, 3)."""
     is_unequal, has_points = np.zeros(len(counts), bool), counts > 0
     if len(points):
         firsts = 3 * geometry.strands.curve_offsets(counts)[:-1][has_points].astype(np.int64)

@@ -215,8 +215,8 @@ def bind(
 ) -> Styling:
     """Bind styles to strands; sites that `trees` does not contain yet are placed and bound.
 
-    binding: of the strands; guides: that the strands follow; inputs: `Inputs` of the styles; axes: (4, 4), from the
-    coordinates of strands to the surface's own, without scale; point_count: of a strand.
+    binding and guides of the strands; inputs: `Inputs` of the styles; axes: (4, 4), from the coordinates of strands to
+    the surface's own, without scale; point_count: points per strand.
     """
     device = binding.positions.device
     levels = programs.tree_levels(styles)

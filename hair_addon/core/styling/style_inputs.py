@@ -15,7 +15,7 @@ from .varied_numbers import NumberMap
 class Inputs:
     """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects.
 
-    numbers: that differ between strands, by (index of the style, name of its setting).
+    numbers: values that differ between strands, by (index of the style, name of its setting).
     """
 
     masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)

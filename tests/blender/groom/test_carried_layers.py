@@ -80,7 +80,7 @@ def test_change_guide_count_carries_layers(layered):
         now = weigh(layered, *weights)
         np.testing.assert_allclose(now[:60], before[number], atol=2e-6)
         np.testing.assert_allclose(lengths(now), lengths(many), rtol=1e-3)
-        # As hair between the guides that were there.
+        # New guides are close to hair between the former guides.
         expected = between(layered, before[number])
         apart = np.linalg.norm(now[60:] - expected, axis=2).max(axis=1) / lengths(expected)
         assert np.median(apart) < 0.02

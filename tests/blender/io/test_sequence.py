@@ -104,7 +104,7 @@ ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
 
 @pytest.fixture(scope="module")
 def whole(turning, tmp_path_factory):
-    """Return a folder with the sequence rendered by this process at once, as the reference."""
+    """Return the folder of the reference: the sequence rendered by this process in one run."""
     folder = tmp_path_factory.mktemp("whole")
     ended = run_here(*words(turning, folder))
     assert ended.status == 0, ended.errors

@@ -275,7 +275,7 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
     assert len(shaders.program_cache) == programs
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
     assert shown.shadow_maps is maps
-    assert not surfaces  # which stay in the maps of the sun and of the world's directions
+    assert not surfaces  # surfaces stay in the maps of the sun and of the world's directions
     moving = [np.array(map_.read()) for map_ in maps.samplers.values()]
     drawn_scene.read(*scene_now(), before=shown)
     for map_, wanted in zip(maps.samplers.values(), moving, strict=True):  # at rest shadows are the same

@@ -82,7 +82,7 @@ def test_the_addon_leaves_programs_when_it_is_switched_off(full):
 
 
 def test_nothing_is_left_when_python_ends(full, monkeypatch):
-    for cache in invalidation.PROGRAMS:  # which the process needs after this test, as it does not end
+    for cache in invalidation.PROGRAMS:  # the process still needs programs after this test
         monkeypatch.setattr(cache, "_values", dict(cache._values))
     invalidation.end()
     assert not filled()

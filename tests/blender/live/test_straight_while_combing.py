@@ -59,7 +59,7 @@ def stroke(combed_guides, steps=3):
 def made_anew(hair, is_styled):
     """Return the points (S, P, 3) interpolated from the current guides."""
     state = hair.data.vellus
-    depsgraph = bpy.context.evaluated_depsgraph_get()  # which may update, so before anything is marked
+    depsgraph = bpy.context.evaluated_depsgraph_get()  # this may update, so it comes before any mark
     styles, is_stale = style_items.styles_of(state), state.is_stale
     style_items.assign(state, styles if is_styled else ())
     try:

@@ -178,7 +178,7 @@ def test_what_the_camera_does_not_see_still_casts_its_shadow(stage):
 
 
 def test_what_is_indirect_only_is_not_seen(stage):
-    bpy.data.objects["Sun"].rotation_euler.x -= math.radians(60.0)  # whose shadow falls beside what is behind it
+    bpy.data.objects["Sun"].rotation_euler.x -= math.radians(60.0)  # its shadow falls beside the surface behind it
     bare = seen_color(picture())
     blocker = plane(matt(0.8, 0.1, 0.1), depth=0.5)
     collection = bpy.data.collections.new("Indirect")

@@ -85,7 +85,7 @@ def test_hair_that_is_pinned_to_the_tip_moves_with_its_surface(rng):
 def test_a_jump_takes_hair_along_as_it_is(rng):
     """A jump of any distance takes hair along with its shape and speed relative to the surface."""
     groom, pose = fur(rng)
-    settings = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0)  # whose grid does not turn with the hair
+    settings = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0)  # their grid does not turn with the hair
     jump = RigidMotion(rotations.unit(np.array([0.0, 0.0, 0.9, 0.1])), np.zeros(3), np.array([30.0, -4.0, 7.0]))
     staying, jumping = (Simulation(groom, settings, pose, NONE, DEVICE) for _ in range(2))
     before = [play(simulation, pose, range(1, 5), NONE.gravity, False) for simulation in (staying, jumping)]

@@ -107,7 +107,7 @@ def test_an_image_counts_as_the_weights_that_say_the_same():
     half[:, :32] = 1.0
     painted = groom_defaults.hair_size(mesh, texture=Texture(half, uvs))
     weighted = groom_defaults.hair_size(mesh, (mesh.vertices[:, 0] < 0.01).astype(np.float32))
-    large, large_uvs = plane(3.0)  # whose two triangles know nothing of the halves
+    large, large_uvs = plane(3.0)  # its two triangles do not follow the halves
     coarse = groom_defaults.hair_size(large, texture=Texture(half, large_uvs))
     for size in (painted, weighted, coarse):
         assert size.length == pytest.approx(groom_defaults.hair_size(plane(3.0)[0]).length * np.sqrt(0.5), rel=0.05)

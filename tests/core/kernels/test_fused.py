@@ -68,4 +68,4 @@ def test_a_product_and_a_sum_are_rounded_once(rng, tmp_path, monkeypatch, proces
     exact = [Fraction(a) * Fraction(b) + Fraction(c) for a, b, c in given.T.astype(float).tolist()]
     np.testing.assert_array_equal(out.numpy(), [nearest_float(value) for value in exact])
     twice = given[0].astype(float) * given[1] + given[2]
-    assert (twice.astype(np.float32) != out.numpy()).sum() > 20  # which double precision alone rounds wrongly
+    assert (twice.astype(np.float32) != out.numpy()).sum() > 20  # double precision alone rounds these wrongly

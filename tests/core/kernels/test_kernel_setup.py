@@ -12,7 +12,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.kernels import kernel_entries, kernel_setup
 from hair_addon.core.long_work import Job, Stopped
 
-SECONDS = 0.02  # that compiling a module takes
+SECONDS = 0.02  # time to compile a module [s]
 
 numbers = count()
 

@@ -93,7 +93,7 @@ def test_neighbours_are_the_nearest_in_order_whatever_side_they_are_on():
     places = positions(domain.mesh, points)
     apart = np.sort(np.linalg.norm(places[:, None] - places[None], axis=2), axis=1)
     counts = sites.counts.numpy()
-    # As many are on the other side, so that for most sites one search is not enough.
+    # The other side has as many sites, so one search is not enough for most sites.
     assert np.median(counts) > voronoi.SITES_AROUND
     for site, count in enumerate(counts):
         around = sites.around.numpy()[site, :count]

@@ -181,7 +181,7 @@ def test_progress_of_placing_locks_rises_and_may_stop_it(hair):
     assert list(parts) == sorted(parts) and parts[: len(told)] == tuple(told)
     assert parts[0] < 0.01 and parts[-1] > 0.9 and np.diff(parts).max() < 0.35
     assert hair.trees.lacks([tree]) == []
-    hair.trees.search([tree], stop)  # which has nothing to do
+    hair.trees.search([tree], stop)  # the search has nothing to do
     found, at_once = hair.trees.levels(tree), hair.rooted(hair.binding.roots).trees.levels(tree)
     for one, other in zip(found, at_once, strict=True):
         np.testing.assert_array_equal(one.positions.numpy(), other.positions.numpy())

@@ -26,7 +26,7 @@ OURS = ROOTS | {
     "surface_uv_coordinate": ("FLOAT2", "CURVE"),
     "surface_normal": ("FLOAT_VECTOR", "CURVE"),
 }
-# None: removed.
+# Type and domain of the replaced attribute; None removes the attribute.
 OTHERS = {
     "removed": None,
     "vectors": ("FLOAT_VECTOR", "POINT"),

@@ -16,8 +16,8 @@ APPLIED, LAST = 4, 6
 
 @pytest.fixture
 def played(blender, monkeypatch):
-    """Return a function of a place that grows simulated hair there, on a surface that a parent swings, and returns
-    its guides.
+    """Return a function that grows simulated hair at a named place on a surface with a swinging parent and returns
+    the guides.
     """
     monkeypatch.setattr(running, "has_window", lambda: True)
 

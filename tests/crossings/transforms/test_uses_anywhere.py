@@ -220,7 +220,7 @@ def test_copies_on_a_mesh_elsewhere_are_the_same_in_the_world(placed_files, tmp_
         tolerance = 2e-6 * before.size + 1e-6 * abs(before.vertices).max()
         np.testing.assert_allclose(its_points, points, rtol=0.0, atol=tolerance, err_msg=name)
         np.testing.assert_allclose(its_lengths, lengths, rtol=1e-3, err_msg=name)
-        if name != "library":  # whose guides are shown by a thickness that follows from their length
+        if name != "library":  # guides of a library are shown with a thickness that follows from their length
             np.testing.assert_allclose(its_radii, radii, rtol=1e-3, err_msg=name)
         # Strands grow anew: as many, as thick and as long.
         _points, radii, lengths = before.strands["Hair"]

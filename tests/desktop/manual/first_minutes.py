@@ -35,7 +35,7 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-# Few, for drivers without a GPU, which take one sample with each redraw.
+# The defaults are low for drivers without a GPU, which take one sample per redraw.
 SAMPLES, STRAND_COUNT = map(int, MORE) if MORE else (2, 5_000)
 
 # Pixels from the upper right corner of the 3D view: the arrow that opens its sidebar.

@@ -31,7 +31,7 @@ def build(folder):
     space.region_3d.view_location, space.region_3d.view_distance = (0.0, 0.0, 0.0), 16.0
     space.show_region_ui = True
     yield from wait(0.5)
-    _sidebar().active_panel_category = "Hair"  # whose panels are drawn with every step
+    _sidebar().active_panel_category = "Hair"  # its panels are drawn with every step
     yield
 
 

@@ -52,7 +52,7 @@ def tables_and_settings(found, folder):
     bpy.ops.vellus.bake_tables(directory=str(folder / "of hair"), size=32)
     for path in sorted((folder / "of hair").iterdir()):
         found.add_file(f"of hair/{path.name}", path)
-    hair.data.vellus.table_folder = ""  # which is another in each run
+    hair.data.vellus.table_folder = ""  # the folder differs in each run
     api.save_settings(folder / "settings.json", api.settings_of(hair))
     found.add_file("settings.json", folder / "settings.json")
     bpy.ops.vellus.save_groom_settings(filepath=str(folder / "operator.json"))

@@ -10,14 +10,14 @@ UV_MAP = "UVMap"
 
 
 def new_collection(name, surface_object):
-    """Return a new collection in the collection of a surface."""
+    """Add a collection to the collection of a surface and return it."""
     collection = bpy.data.collections.new(name)
     surface_collections.collection_of(surface_object).children.link(collection)
     return collection
 
 
 def new_object(name, source, surface_object, collection, material):
-    """Return a new mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
+    """Add a mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface; return it."""
     mesh = bpy.data.meshes.new(name)
     faces = source.faces
     mesh.vertices.add(len(source.vertices))

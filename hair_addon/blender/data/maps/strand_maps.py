@@ -30,7 +30,7 @@ def has_looks(state) -> bool:
 def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLooks | None, list[HairError]]:
     """Return (`StrandLooks` of hair Curves, errors about missing sources); None without maps of the look.
 
-    strands: that the looks are for; None: those that are stored. A setting with a missing source keeps its value.
+    strands: strands to return looks for; None: the stored strands. A setting with a missing source keeps its value.
     """
     if not has_looks(hair.vellus):
         return None, []

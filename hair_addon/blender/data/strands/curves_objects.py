@@ -21,7 +21,7 @@ def new_object(name, surface_object, is_rendered=True):
 
 
 def link_object(name, curves, surface_object, is_rendered=True):
-    """Return a new object for Curves, a child of their surface and in its collection.
+    """Add an object for Curves, a child of their surface, to the collection of the surface and return it.
 
     is_rendered: whether Cycles and EEVEE show it.
     """

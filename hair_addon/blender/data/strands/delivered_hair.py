@@ -100,7 +100,7 @@ def _absolute(filepath):
 
 
 def new_probe(hair_object):
-    """Return a copy of an object whose Curves follow their surface, without the modifiers after that.
+    """Add a copy of a hair object without the modifiers after the one that follows the surface, and return it.
 
     The copy is always visible. The caller removes it.
     """

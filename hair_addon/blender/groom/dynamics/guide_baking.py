@@ -201,7 +201,7 @@ def _results(tasks, counts):
 
 
 def _end(its_scene, present, baked):
-    """Return to the scene's former frame; its baked guides are shown after the next update."""
+    """Go back to the scene's former frame; its baked guides are shown after the next update."""
     global _baking
     try:
         with contextlib.suppress(HairError):  # the scene was deleted in the meantime

@@ -47,7 +47,7 @@ def _rename(curves_object, name):
 
 
 def _joined(objects, applies_modifiers):
-    """Return a new object with the curves of all, with the transform of the first."""
+    """Add an object with the curves of all objects and the transform of the first; return it."""
     copies, before = [], {data.session_uid for data in _all_data()}
     for one in objects:
         copies.append(_copy(one))

@@ -155,7 +155,7 @@ def _write_hair(hair, guides, surface, placed, settings, guide_map):
             attributes.write(hair, name, data_type, "CURVE", values)
     curves.write_guide_map(hair, guide_map)
     kept_shapes.keep(guides, curves.read_points(guides))
-    # So that regenerated strands use these roots, and nothing is regenerated automatically.
+    # Regenerated strands use these roots, and nothing is regenerated automatically.
     state.root_key = staleness.root_key(settings, None)
     state.followed = staleness.guides_digest(guides)
     state.is_stale = False

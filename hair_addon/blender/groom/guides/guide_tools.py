@@ -130,7 +130,10 @@ def on_surface(datablock: Curves, surface: Surface) -> CombedGuides:
 
 
 def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
-    """Return the `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
+    """Record the edits of guide Curves and return their `CombedGuides`, weighted by selection and mask.
+
+    Raises `HairError`.
+    """
     curves.require_editable(datablock)
     layer_items.require_combable(datablock.vellus)
     recording.update(datablock, depsgraph)

@@ -151,7 +151,7 @@ def follow(strands: Curves, surface: Surface, change: Affine, depsgraph: Depsgra
     stored = stored_roots.points(strands, surface)
     if stored is not None:
         firsts = curves.first_points(strands)
-        curves.write_roots(strands, surface, stored, firsts=firsts)  # whose normals are in local coordinates
+        curves.write_roots(strands, surface, stored, firsts=firsts)  # normals of roots are in local coordinates
     _note_moved(strands, baked_as, followed)
 
 

@@ -178,7 +178,7 @@ def is_combing(context):
 
 
 def _stop(context):
-    """Return to Object Mode and make the hair of the guides active, if there is any."""
+    """Switch to Object Mode and make the hair of the guides active, if there is any."""
     guides = context.object.data
     bpy.ops.object.mode_set(mode="OBJECT")
     shown = (object_of(hair, context.view_layer) for hair in followers(guides))

@@ -148,7 +148,7 @@ def test_names_that_neither_mesh_has_are_cleared_and_reported(hair, capfd):
     target = other_sphere(3)
     update()
     made, _guides = transfer(target, hair)
-    assert made.data.vellus.styles[0].curl.mask == "elsewhere"  # which the guides carry
+    assert made.data.vellus.styles[0].curl.mask == "elsewhere"  # the guides carry this mask
     guides_object(hair).data.attributes.remove(guides_object(hair).data.attributes["elsewhere"])
     made, _guides = transfer(target, hair)
     assert made.data.vellus.styles[0].curl.mask == ""

@@ -159,7 +159,7 @@ def test_the_panel_and_the_menu_offer_each_tool_once(waved, active):
         assert {name: drawn[f"vellus.{name}"] for name in TOOLS} == dict.fromkeys(TOOLS, 1)
 
 
-@pytest.mark.parametrize("name", sorted(SHAPING.keys() - {"copy_guide_shape"}))  # which looks for the nearest guides
+@pytest.mark.parametrize("name", sorted(SHAPING.keys() - {"copy_guide_shape"}))  # it looks for the nearest guides
 def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
     """Hair follows a tool as it follows a brush, without a search among guides and without binding again."""
     calls = counts_of(monkeypatch)

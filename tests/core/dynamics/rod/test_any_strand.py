@@ -95,7 +95,7 @@ def test_strands_in_thick_air_stay_as_they_are(thickness):
     directions = 0.3 * rng.normal(size=(64, vertex_count - 1, 3)) / np.sqrt(3.0) + [1.0, 0.0, 0.0]
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     groom = np.concatenate([np.zeros((64, 1, 3)), segment * np.cumsum(directions, axis=1)], axis=1)
-    # As stiff as the inertia of a frame is at LEAST_INERTIA.
+    # The stiffness at which the inertia of a frame is LEAST_INERTIA.
     modulus = 1300.0 * segment**4 / (9e-6 * size**2 * (1.0 + damping / size) * radius**2) * 1e-9
     fibre = DynamicsSettings(
         bend_stiffness=1.0, youngs_modulus=modulus, shear_modulus=modulus / 2.7, fibre_radius=radius, damping=damping

@@ -36,7 +36,7 @@ def _directions(
 
 
 def test_directions_are_as_dense_as_light(rng):
-    """Directions are as dense as light: each half of the world along three axes has the light of its texels."""
+    """Directions are as dense as light: each hemisphere along three axes gets its share of the world's power."""
     picture = rng.exponential(size=(12, 24, 3)) ** 3
     with wp.ScopedDevice("cpu"):
         world = world_light.world_of(picture)
