@@ -21,7 +21,7 @@ from blend_samples.dynamics import dynamics_film, dynamics_plots, dynamics_scene
 
 
 def main():
-    """Make what is asked for, all by default; the exit status is 0 only if all of it was made."""
+    """Make the requested pictures, all by default; the exit status is 0 only if all were made."""
     made = {**dynamics_strips.STRIPS, "plots": None, "film": None}
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(made)}; all by default")

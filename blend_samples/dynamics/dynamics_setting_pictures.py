@@ -168,7 +168,7 @@ _ALONE = {"hair_friction": 0.0, "hair_pressure": 0.0}  # a strand that has no ot
 
 
 def main():
-    """Draw what is asked for, all by default."""
+    """Draw the requested pictures, all by default."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="settings such as bend_stiffness; all by default")
     parser.add_argument("--out", type=Path, default=OUT)

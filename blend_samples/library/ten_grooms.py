@@ -68,7 +68,7 @@ SAMPLES = {
 
 
 def main():
-    """Draw what is asked for, all by default; the sheet is written only if all of it was drawn."""
+    """Draw the requested pictures, all by default; the sheet is written only if all were drawn."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="grooms such as Pixie; all by default")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "grooms.png")

@@ -96,7 +96,7 @@ ELSEWHERE = ("scenes.png", "scenes_worst.png")
 
 
 def main():
-    """Draw what is asked for; the exit status is 0 only if all of it was drawn."""
+    """Draw the requested pictures; the exit status is 0 only if all were drawn."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     known = f"of {', '.join(SCRIPTS)}, all by default; and {', '.join(SLOW)}"
     parser.add_argument("names", nargs="*", help=known)

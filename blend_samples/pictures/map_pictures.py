@@ -35,7 +35,7 @@ WHITE = (0.75, 0.70, 0.62)
 
 
 def main():
-    """Draw what is asked for, all by default; a sheet is written only if all of it was drawn."""
+    """Draw the requested pictures, all by default; a sheet is written only if all were drawn."""
     names = [name for rows in SHEETS.values() for name in rows]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all by default")

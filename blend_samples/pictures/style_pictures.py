@@ -68,7 +68,7 @@ STANDING = (
 
 
 def main():
-    """Draw what is asked for, all by default."""
+    """Draw the requested pictures, all by default."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="strips such as curl_radius; all by default")
     parser.add_argument("--out", type=Path, default=OUT)

@@ -27,7 +27,7 @@ STRAND_RADIUS = 1.1e-4  # [m]: strands that are seen in a small picture
 
 
 def main():
-    """Draw what is asked for, every preset by default."""
+    """Draw the requested presets, all by default."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="presets such as CURLY; all by default")
     names = parser.parse_args().names or list(style_presets.PRESETS)

@@ -32,7 +32,7 @@ LIGHTS = {"Key": 24.0, "Rim": 6.0, "Fill": 8.0}  # [W]: a weak rim, which shows 
 
 
 def main():
-    """Draw what is asked for, all by default; the exit status is 0 only if all of it was drawn."""
+    """Draw the requested pictures, all by default; the exit status is 0 only if all were drawn."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="styles, or wet for the row of wetness; all by default")
     parser.add_argument("--out", type=Path, default=ROOT / "docs")
