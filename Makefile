@@ -32,8 +32,9 @@ test: $(installed) ## all tests except benchmarks and tests in a window, in up t
 farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
 	$(python) -m pytest -m farm tests/command_line $(ARGS)
 
+# Three processes, as walks wait for a quarter of their time.
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
-	$(python) -m pytest -m "desktop and not long" --numprocesses 2 --dist loadfile --no-loadscope-reorder tests/desktop $(ARGS)
+	$(python) -m pytest -m "desktop and not long" --numprocesses 3 --dist loadfile --no-loadscope-reorder tests/desktop $(ARGS)
 
 bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)

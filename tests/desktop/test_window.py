@@ -32,7 +32,7 @@ STEPS = {
 
 
 # What is drawn is seen with both drivers; strokes, undo and files are the same with any.
-PARTS = {"opengl": ("groom", "view", "render", "mend_and_write"), "vulkan": ("grown", "view", "render", "mend")}
+PARTS = {"opengl": ("groom_and_view", "render_and_mend"), "vulkan": ("grown", "view", "render", "mend")}
 
 
 def walk_with(backend, desktop, extension, profile):

@@ -362,12 +362,12 @@ def hurry():
 
 
 PARTS = {
-    "groom": (install, hurry, head, grow, comb, save_and_load),
+    "groom_and_view": (install, hurry, head, grow, comb, save_and_load, reopen, click, shading_modes),
     "grown": (install, hurry, head, grow, save_and_load),
     "view": (hurry, reopen, click, shading_modes),
     "render": (hurry, reopen, render),
     "mend": (hurry, reopen, break_shader, switch_off, twins),
-    "mend_and_write": (hurry, reopen, break_shader, write_files, switch_off, twins),
+    "render_and_mend": (hurry, reopen, render, reopen, break_shader, write_files, switch_off, twins),
 }
 
 

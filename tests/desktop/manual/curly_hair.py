@@ -331,13 +331,6 @@ def comb_styled():
     picture("combed_styled")
 
 
-PARTS = {
-    "cut": (bare_head, hair_system, comb, shoulder_length, fringe),
-    "curl": (locks, curls, smooth_curls, paint, look),
-    "beyond": (key_move_undo, comb_styled),
-}
-
-
 def go_on():
     """Open the file of the previous part."""
     if not MORE:
@@ -353,6 +346,13 @@ def save():
     """Save the file for the next part."""
     bpy.ops.wm.save_as_mainfile(filepath=str(SCENE))
     yield
+
+
+PARTS = {
+    "cut": (bare_head, hair_system, comb, shoulder_length, fringe),
+    "curl": (locks, curls, smooth_curls, paint, look),
+}
+PARTS["curl_and_beyond"] = (*PARTS["curl"], save, go_on, key_move_undo, comb_styled)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time f
 
 
 # The manual's steps with both drivers; what goes beyond them is the same with any.
-PARTS = {"opengl": ("cut", "curl", "beyond"), "vulkan": ("cut", "curl")}
+PARTS = {"opengl": ("cut", "curl_and_beyond"), "vulkan": ("cut", "curl")}
 
 
 @pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)

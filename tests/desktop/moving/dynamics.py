@@ -332,16 +332,16 @@ def state_after_load():
     return [] if not is_busy() and np.isfinite(strands()).all() else [state(), is_busy()]
 
 
-PARTS = {"play": (hair_on_a_swinging_ball, played, jumped_back, undone), "bake": (baked, stopped)}
-PARTS |= {"end": (loaded, ended), "vanish": (deleted, disabled)}
-
-
 def go_on():
     """Open the file of the previous part."""
     refine_to()
     bpy.ops.wm.open_mainfile(filepath=str(SCENE))
     yield from wait(1.0)
     activate(of_kind("GUIDES"))
+
+
+PARTS = {"play": (hair_on_a_swinging_ball, played, jumped_back, undone), "bake": (baked, stopped)}
+PARTS |= {"end": (loaded, ended, go_on, deleted, disabled), "vanish": (deleted, disabled)}
 
 
 if __name__ == "__main__":
