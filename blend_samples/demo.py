@@ -175,7 +175,7 @@ def print_frame_table(hair):
 
 @contextmanager
 def _head_and_hair_alone(hair):
-    """A scene without what the portrait adds to its head and its hair, in a context."""
+    """Hide all objects of the portrait but its head and hair, in a context."""
     others = [
         other
         for other in bpy.context.scene.objects

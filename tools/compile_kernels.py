@@ -73,7 +73,7 @@ def this_platform() -> str:
 
 
 def sources():
-    """Return the files that decide what is compiled: those of the core, this one, and the lock that pins Warp."""
+    """Return the files that compiled kernels depend on: the core, this file, and the lock file that pins Warp."""
     core = sorted(path for path in (ROOT / "hair_addon" / "core").rglob("*") if path.suffix in SOURCE_SUFFIXES)
     return [*core, ROOT / "requirements.lock", Path(__file__)]
 

@@ -140,7 +140,7 @@ COIL = Experiment(
     curl(), (0.0, 4.0), (-0.11, -0.275, 0.29), {"sag_free": False, "bend_stiffness": 3.0, "vertex_count": 61}
 )
 HEAVY = Experiment(HANGING, (0.0, 4.0), (-0.09, -0.21, 0.22), {"sag_free": False, "weight": 10.0})
-# In thin air and small steps, which do not slow it down: what is left is the damping.
+# Thin air and small steps barely slow hair down, so damping alone does.
 UNBRAKED = {"sag_free": False, "air_drag": 0.05, "substeps": 24}
 SWINGING = Experiment(straight(0.1, (1.0, 0.0, 0.0)), (0.0, 1.5), (0.0, -0.05, 0.06), UNBRAKED, is_trace=True)
 

@@ -52,7 +52,7 @@ SLOW = {
     "panels": "tools/manual_pictures.py",
 }
 
-# Name → what it leaves in OUT: the picture of docs/.
+# Name → {file that it leaves in OUT: picture of docs/}.
 COPIED = {
     "demo": {f"{name}.png": f"{name}.png" for name in ("kajiya_kay", "marschner", "dual_scattering", "styled")},
     "cycles": {"cycles.png": "dual_scattering_cycles.png"},

@@ -79,7 +79,7 @@ def backdrop():
 
 
 def over_backdrop():
-    """Blender's compositor lays what is rendered over the backdrop."""
+    """Set up Blender's compositor to lay the render over the backdrop."""
     picture = bpy.data.images.new("Backdrop", *SIZE, float_buffer=True)
     picture.pixels.foreach_set(backdrop().ravel())
     tree = bpy.data.node_groups.new("Composite", "CompositorNodeTree")

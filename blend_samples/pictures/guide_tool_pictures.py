@@ -92,7 +92,7 @@ def add_side(skull):
 
 
 def add_plane():
-    """An empty whose +Z side, what is below the mouth and more at the back, is cut off."""
+    """Add an empty that cuts hair on its +Z side: below the mouth, and higher at the back."""
     plane = bpy.data.objects.new("Plane", None)
     plane.location, plane.rotation_euler = (0.0, 0.0, 0.66), (np.pi - 0.15, 0.0, 0.0)
     bpy.context.scene.collection.objects.link(plane)

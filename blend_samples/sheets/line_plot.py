@@ -51,7 +51,7 @@ class Canvas:
 
 
 class Plot(Canvas):
-    """A canvas with a title, axes and their ticks, and a legend of what is drawn with a label."""
+    """A canvas with a title, axes and their ticks, and a legend of the labeled lines."""
 
     def __init__(self, title, x_limits, y_limits, ticks=((), ()), x_label="", size=(320, 320), legend=(0.62, 0.06)):
         """legend: its place, parts of the plot from its top left."""

@@ -279,7 +279,7 @@ def _array(size, layer_count, texture_format):
 
 
 def _aim(light, hair, loose, size):
-    """Return the view of a light that contains the hair, also written into the light; None without an axis.
+    """Write the view of a light that contains the hair into the light and return it; None without an axis.
 
     loose: (center, radius) of a sphere around the hair; lights inside of it use a tight sphere. The view of a light in
     or next to both contains everything up to `_WIDEST` off its axis.
@@ -308,8 +308,8 @@ def _aim(light, hair, loose, size):
 
 
 def _aim_wide(light, centre, radius, size):
-    """Return the view of a light that contains a sphere, also written into the light; a smaller sphere if the light
-    is inside.
+    """Write the view of a light that contains a sphere into the light and return it; a smaller sphere if the light is
+    inside.
 
     None for a light at the sphere's center.
     """

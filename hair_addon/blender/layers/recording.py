@@ -193,7 +193,7 @@ def mark_painted(guides: Curves, depsgraph: Depsgraph) -> None:
 def _mask(guides, identity, name, depsgraph):
     """Return (G,) weights of a vertex group at the roots.
 
-    Without such a group, or faces, weights are those that guides were composed with, or 1.
+    Without the group or faces, set the error of the guides and return the weights of their last composition, or 1.
     """
     try:
         surface = scene.read_surface(guides.surface, depsgraph)

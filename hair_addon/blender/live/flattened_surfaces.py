@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Surfaces with a scale of zero: their guides and hair wait, and follow what has changed once the scale is not zero."""
+"""Surfaces with a scale of zero: their guides and hair follow changes only once the scale is not zero."""
 
 from ...core.errors import HairError
 from ..data import scene, surface_space

@@ -17,7 +17,7 @@ def mark_shading(group, _context):
 
 
 def mark_map(item, context):
-    """Mark what the map of a setting changes: the shading, the simulation, or the strands."""
+    """Mark the shading, the simulation or the strands, whichever the map of a setting changes."""
     if item.setting.startswith("dynamics."):
         mark_dynamics(item, context)
     elif item.setting.startswith("look."):
@@ -27,7 +27,7 @@ def mark_map(item, context):
 
 
 def mark_changed_map(item):
-    """Mark what a map changes whose source has changed, within the update that reports the source."""
+    """Mark the same as `mark_map` after a change of a map's source, within the update that reports the source."""
     state = item.id_data.vellus
     if item.setting.startswith("dynamics."):
         state.is_dynamics_stale = True

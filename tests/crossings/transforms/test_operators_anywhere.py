@@ -38,7 +38,7 @@ def _add_arc(body):
 
 
 def opened(path, is_applied=False):
-    """Open a file and apply the transform of its surface; returns what is seen."""
+    """Open a file and apply the transform of its surface; returns the `Placed` hair."""
     bpy.ops.wm.read_homefile(filepath=path)
     bpy.context.view_layer.update()
     if is_applied:
@@ -128,7 +128,7 @@ def draw(operator, active):
 
 
 def uncombed(path, is_applied):
-    """Open a file and regenerate its guides, which then follow flow lines; returns what is seen."""
+    """Open a file and regenerate its guides, which then follow flow lines; returns the `Placed` hair."""
     opened(path, is_applied)
     select(bpy.data.objects["Guides"])
     settings = {"guide_count": placed_hair.GUIDES, "length": 0.3 * seen().size, "gravity": 0.0}

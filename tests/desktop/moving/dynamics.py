@@ -98,7 +98,7 @@ def go_to(frame):
 
 
 def look(_scene, _depsgraph):
-    """Store what is drawn; called after each change of frame, after the add-on."""
+    """Store the drawn strands; called after the add-on's handler for each change of frame."""
     if of_kind("HAIR") is not None and of_kind("GUIDES") is not None and f"{MODULE}.hair_addon.blender" in sys.modules:
         seen[scene().frame_current] = strands()
 

@@ -128,7 +128,7 @@ def remember() -> None:
 
 
 def new_folder(guides: Curves) -> Path:
-    """Return the folder to bake guides to: theirs, or a new one if they have none or share it with other guides."""
+    """Assign a new bake folder to guides that have none or share it with other guides; return the guides' folder."""
     folder = folder_of(guides)
     if attributes.is_from_library(guides):
         return folder

@@ -205,10 +205,10 @@ def drawn_scene_of(context):
 
 
 def _lit(view, context, light):
-    """Return the `DrawnScene` of a `_View` in the light of the context's region.
+    """Return the `DrawnScene` of a `_View` in the light of the context's region, and keep it in the view.
 
-    Regions of a viewport, as in a quad view, differ in lights that follow the view. While it turns they follow in
-    steps, as each step draws shadow maps.
+    Regions of a viewport, as in a quad view, differ in lights that follow the view. While the view turns, lights
+    follow in steps, as each step draws shadow maps.
     """
     region = context.region.as_pointer()
     known = view.lit.get(region, view.drawn)

@@ -25,7 +25,7 @@ class HairTab:
 
 
 def split(layout):
-    """Return the layout with labels in a separate column."""
+    """Put labels of a layout in a separate column; return the layout."""
     layout.use_property_split = True
     layout.use_property_decorate = False
     return layout

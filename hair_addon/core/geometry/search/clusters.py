@@ -83,7 +83,7 @@ def _nearest(features, centres, progress):
 
 
 def _without_empty(labels, squares, count):
-    """Return labels without empty clusters, which get the rows farthest from centers, from clusters of several rows."""
+    """Fill empty clusters with the rows farthest from centers, from clusters of several rows; return the labels."""
     sizes = np.bincount(labels, minlength=count)
     missing = list(np.flatnonzero(sizes == 0))
     for row in np.argsort(-squares, kind="stable"):

@@ -143,7 +143,7 @@ def _bun(tie, start, normal, reach, settings):
 
 
 def _smooth(centers):
-    """Return a line with rounded corners, changed in place; the ends do not move."""
+    """Round the corners of a line in place and return it; the ends do not move."""
     for _ in range(12):
         centers[1:-1] = 0.5 * centers[1:-1] + 0.25 * (centers[:-2] + centers[2:])
     return centers
