@@ -33,7 +33,7 @@ from hair_addon.core.imaging.pixel_sampling import PictureSettings
 STYLE = "CURLY"  # of styled.png
 SAMPLES_PER_SIDE = 3  # of each pixel
 PORTRAIT_SAMPLES_PER_SIDE = 4  # of dual_scattering.png
-LENS_PASSES = 4  # of it: blur is up to three pixels wide, and each pass draws all strands
+LENS_PASSES = 4  # of dual_scattering.png: blur is up to three pixels wide, and each pass draws all strands
 SMALL_SIZE = 440, 440  # pixels of the other pictures, two of which are shown side by side
 CYCLES_SAMPLES = 32  # by default; denoised, as Blender does unless told otherwise
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}

@@ -5,7 +5,7 @@ import ast
 
 from tests.test_conventions import MODULES, name_of, nodes, syntax
 
-# What is no cache, each with who ends it.
+# State that is no cache → the event that resets it.
 STATE = {
     "blender/data/whole_changes.py: _open": "the end of each step of a change, a context",
     "blender/groom/guides/brushes.py: _fitted": "nobody: Blender's brushes and what was set in them outlive a file",

@@ -60,7 +60,7 @@ OTHERS += [
     NUMBERS,
 ]
 
-# What would take long, or fill memory, without being wrong.
+# Largest values of arguments that would otherwise take long or fill memory.
 COSTLY = {
     "guide_count": 40,
     "strand_count": 100,

@@ -42,7 +42,7 @@ REPETITIONS = 50
 ACTIONS = ("stroke", "slider", "surface", "bending", "playback")
 _OF_SURFACE = {"surface", "bending"}
 
-# What is timed by itself, each waited for; the host has the rest.
+# Parts that are timed and waited for one by one; the remaining time is the host's.
 PARTS = {
     "guides' upload": (strand_maker.StrandMaker, "put_guides"),
     "strands": (hair_cache, "strands_on_gpu"),

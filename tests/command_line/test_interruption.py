@@ -64,7 +64,7 @@ class AtWords:
         return getattr(self._stream, name)
 
 
-# What is shown of progress is wiped away: one sentence stays.
+# The line of progress is erased: only this sentence stays.
 STOPPED = "vellus: stopped: unfinished results were not written.\r\n"
 
 

@@ -200,7 +200,7 @@ def maps_guides(before, after):
     assert guide.min() >= 0 and guide.max() < len(after)
 
 
-# What an artist gives a modifier beside what it has by itself, and what it then does.
+# Modifier → (inputs that differ from the defaults, check of its effect).
 LAWS = {
     "Attach Hair Curves to Surface": ({"Surface Object": "Sphere"}, attaches),
     "Blend Hair Curves": ({"Blend Radius": 0.5}, blends),

@@ -31,7 +31,7 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-# What the redo panel changes.
+# Tool → settings that the redo panel changes.
 TOOLS = {
     "guide_length": {"factor": 0.5},
     "trim_guides": {"cutter": "Lower"},

@@ -25,7 +25,7 @@ def walk(request, desktop, extension, new_profile):
 
 def test_it_comes_to_its_end(walk):
     walk.assert_done()
-    # What the add-on says of the emptied hair is no error.
+    # Messages of the add-on about the emptied hair are no errors.
     assert [line for line in walk.complaints() if not line.startswith("Vellus:")] == []
     assert "Not freed memory blocks" not in walk.log, walk.log[-4000:]
 

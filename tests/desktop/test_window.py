@@ -31,7 +31,7 @@ STEPS = {
 }
 
 
-# What is drawn is seen with both drivers; strokes, undo and files are the same with any.
+# Drawing is tested with both drivers; strokes, undo and files do not depend on the driver.
 PARTS = {"opengl": ("groom_and_view", "render_and_mend"), "vulkan": ("grown", "view", "render", "mend")}
 
 

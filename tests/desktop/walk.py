@@ -214,7 +214,7 @@ def click():
     with in_viewport():
         near = [(int(x) - region.x, int(y) - region.y) for x, y in places(points("Hair"))[20::41]]
         on_hair = next(place for place in near if blender.render.viewport.viewport.hair_at(bpy.context, *place) == hair)
-        # What of the head is closest to the viewer is in front of everything else of it.
+        # The vertex closest to the viewer is in front of the rest of the head.
         eye = area.spaces.active.region_3d.view_matrix.inverted().translation
         skin = sorted(
             (head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length

@@ -35,7 +35,7 @@ vec3 hair_return_part(float sine, int part) {
 }
 """
 
-# What the rasterizer gives a model of the strand under a fragment.
+# Inputs of a model from the rasterizer: the strand under a fragment.
 STRAND = "int strand_index; float strand_position;\n"
 
 

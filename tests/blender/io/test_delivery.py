@@ -163,7 +163,7 @@ def test_hair_that_is_delivered_again_plays_the_new_frames(shot):
     assert largest_difference(live((4.0, 4.75)), played) < 1e-6
 
 
-# What is refused, or ends early, changes nothing.
+# A delivery that is refused or ends early changes nothing.
 
 
 def state():

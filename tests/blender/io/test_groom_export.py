@@ -20,7 +20,7 @@ from tests.support.reading import attribute, points, write_points
 NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curves in any Alembic file
 
 
-# What is written.
+# Contents of the files.
 
 
 def test_curves_are_in_centimeters_where_they_are_seen(twisted, tmp_path):

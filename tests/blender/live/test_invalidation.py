@@ -203,7 +203,7 @@ def open_another(folder):
     bpy.ops.wm.open_mainfile(filepath=str(folder / "other.blend"))
 
 
-# What somebody does, by the event that is told of it.
+# Event → an action that causes it.
 SCENARIOS = {
     "scene_changed": lambda _folder: move_sun(),
     "hair_evaluated": lambda _folder: play_modifiers(),

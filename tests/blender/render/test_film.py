@@ -133,7 +133,7 @@ def test_vectors_of_hair_lead_to_the_frame_before_and_from_the_frame_after(lit, 
     ]
     expected = np.c_[before[shown, :2] - now[shown, :2], now[shown, :2] - after[shown, :2]]
     error = np.abs(passes["Vector"][rows, columns] - expected).max(axis=1)
-    # Which point of a strand a sample shows is known to a quarter of its segment.
+    # A sample's point on the strand is known to a quarter of a segment.
     assert np.median(error) < 0.05 and np.quantile(error, 0.95) < 0.25
     assert np.abs(expected).max() > 5.0
 

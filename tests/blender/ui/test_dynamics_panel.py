@@ -90,7 +90,7 @@ def test_meshes_have_a_panel_where_there_are_guides(sphere):
     assert draw(panel) is None
 
 
-# What the settings mean.
+# The effect of settings.
 
 
 def bends(length, **settings):

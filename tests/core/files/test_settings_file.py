@@ -125,7 +125,7 @@ def test_the_schema_knows_every_setting():
     assert {kind: list(found)[2:] for kind, found in of_styles.items()} == {
         kind: [name for name, *_ in declared(settings_class)] for kind, settings_class in KINDS.items()
     }
-    # What tables take from the appearance stands there, under the names that it has there.
+    # Settings of tables that come from the appearance are stored with the appearance, under its names.
     assert everything - {*named} == {"eta", "sigma_a", "beta_r"}
 
 
@@ -165,7 +165,7 @@ def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present,
     write(path, {name: part for name, part in values.items() if name not in kept})
     changed = settings_file.read_partial(path).changed(present)
     for name in SECTIONS:
-        # What follows from the surface is in no file.
+        # Settings that follow from the surface are not stored.
         source = present if name in kept else wanted
         names = [setting for setting, *_ in declared_in(name) if getattr(source, name) is not None]
         found, expected = ({n: getattr(getattr(s, name), n) for n in names} for s in (changed, source))

@@ -67,7 +67,7 @@ def read_table(path, channels, size=None):
     return image.pixels().astype(np.float32), image.header
 
 
-# What is read is what was written.
+# Files are read as they were written.
 
 
 @pytest.mark.parametrize(

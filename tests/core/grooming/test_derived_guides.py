@@ -87,7 +87,7 @@ def test_the_fit_is_the_least_squares_of_interpolation(mesh, hair):
     matrix = np.stack(columns, axis=1).astype(np.float64)
     wanted = points[:, 40] - points[:, 0]
     held = guides - guides[:, :1]
-    # What holds a guide is a part of its own weight, that is of the squares in its columns.
+    # The hold of a guide is a fraction of its own weight: of the squares in its columns.
     hold = guide_fitting._HOLD * np.repeat((matrix**2).sum(axis=0).reshape(6, 3).mean(axis=1), 3)
     best = np.linalg.solve(
         matrix.T @ matrix + np.diag(hold), matrix.T @ wanted.ravel() + hold * held[:, 2].astype(np.float64).ravel()

@@ -36,7 +36,7 @@ RANGES = {
     (frizz.Settings, "spread"): (0.01, 0.2),
     (braid.Settings, "pitch"): (0.04, 0.2),
 }
-# What else is set, so that a slider does something.
+# Other settings that a slider needs for an effect.
 WITH = {
     trim.Settings: {"factor": 0.7, "random": 0.3},
     bend.Settings: {"random_turn": 0.2},

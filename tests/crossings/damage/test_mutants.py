@@ -34,7 +34,7 @@ OTHERS = {
     "blender/render/library_picture.py": "a picture that was just drawn",
     "core/files/light_images.py": "OpenEXR",
     "core/files/table_exr.py": "OpenEXR",
-    # What Vellus has written for itself, or the system.
+    # Files written by Vellus for itself, or by the system.
     "blender/gpu/programs/shaders.py": "the add-on's own shaders",
     "blender/data/strands/follow_nodes.py": "the add-on's own .blend",
     "blender/host/memory.py": "the system's",
@@ -73,7 +73,7 @@ def test_every_reader_has_mutants():
 def test_a_few_mutants():
     read, refused, found = run.faults(930, seed=1)
     assert read == 930 and found == []
-    # Those with a checksum refuse nearly all, but for mutants that are the whole file again.
+    # Readers of files with a checksum refuse all mutants except copies of the whole file.
     assert all(refused[name] >= 27 for name in ("settings", "frame", "arrays", "record of a sequence"))
 
 

@@ -65,7 +65,7 @@ def test_tools_do_the_same_in_the_world(placed_files, place, name):
     path = placed_files(place)
     applied = after_tool(path, tool, values, True)
     as_it_is = after_tool(path, tool, values, False)
-    # What was applied stands 3 m off its origin: single precision turns segments of a body of 1 cm by a part in 300.
+    # An applied body is 3 m from its origin: single precision turns segments of a body of 1 cm by a part in 300.
     tolerances = {"points": 0.02, "lengths": 0.01} if applied.size < 0.1 else {"points": 1e-3}
     if name[-1] == "more":
         tolerances = {"points": 0.02, "lengths": 0.01}  # roots are relaxed until they move no more than that

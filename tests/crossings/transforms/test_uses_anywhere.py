@@ -290,8 +290,8 @@ def in_centimeters(body):
     data("Hair").vellus.hair.radius *= 100.0
 
 
-# What changes nothing of gravity: moves, turns about Z, mirrors across planes that stand upright; and the unit in which
-# the same lengths are measured. Another size or tilt is another motion.
+# Transforms that keep gravity: translations, rotations about Z, mirrors across vertical planes; and another unit of the
+# same lengths. Scale and tilt change the motion.
 ALIKE = {
     "moved": placed_hair.placed((3.0, 1.0, -2.0)),
     "turned about Z": placed_hair.placed((0.0, 0.0, 0.0), (0.0, 0.0, 1.2)),

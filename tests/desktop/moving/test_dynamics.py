@@ -17,7 +17,7 @@ SIZE = (800, 500)  # of the window [pixels]: software drivers take their time fo
 FLIPPED = 0.002
 
 
-# What is drawn, and what goes away while it is, is seen with both drivers; bakes and files with one.
+# Drawing, also of hair that is deleted meanwhile, is tested with both drivers; bakes and files with one.
 PARTS = {"opengl": ("play", "bake", "end"), "vulkan": ("play", "vanish")}
 
 

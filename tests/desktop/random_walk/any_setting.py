@@ -153,7 +153,7 @@ class Artist(Operations, Exchanges):
         assert count < _BLOCKS_AN_OBJECT * len(bpy.data.objects) + _MORE_BLOCKS, count
 
     def _objects(self, kind):
-        # What a script has just removed is listed as None until the next update.
+        # Objects that a script has just removed are listed as None until the next update.
         return [o for o in bpy.context.view_layer.objects if o is not None and o.type == kind]
 
     def _curves(self, kind=None):
@@ -208,7 +208,7 @@ class Artist(Operations, Exchanges):
             return self.random.choice([item.identifier for item in declared.enum_items])
         if declared.is_array:
             return [self.random.random() for _ in range(declared.array_length)]
-        # What is drawn by a processor: thick hair of many points takes seconds a frame.
+        # Limits for drawing by a processor: thick hair of many points takes seconds per frame.
         most = {"guide_count": 200, "strand_count": 2000, "point_count": 60, "thickness": 20.0, "relax_iterations": 20}
         most |= {"size": 64, "levels": 2, "preroll": 3}
         # Smaller locks are tens of thousands.

@@ -28,7 +28,7 @@ def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"
     )
     walk.assert_done()
     assert walk.facts["step_count"] == step_count
-    # What raises is in the console alone, and the walk goes on after it.
+    # Exceptions appear in the console alone, and the walk continues after them.
     log = walk.log
     assert "Traceback" not in log, log[max(log.index("Traceback") - 1000, 0) :][:8000]
     assert "Not freed memory blocks" not in log, log[-4000:]

@@ -50,7 +50,7 @@ _VALUES = {
 _PLAIN = {"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"}
 
 
-# What is digested.
+# Digests of each kind of data.
 
 
 class Digests:

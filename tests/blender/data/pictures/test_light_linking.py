@@ -43,7 +43,7 @@ def tiles(scene):
     return sun
 
 
-# What is linked to the receivers: objects and collections by their names, and the state of each.
+# Objects and collections that receivers are linked to, by name, with the state of each link.
 RULES = {
     "nothing": {},
     "one included": {"plain": "INCLUDE"},

@@ -191,7 +191,7 @@ def test_the_nearest_strand_is_met(rng):
     y = start[:, 1] + part * along[:, 1] - back
     part = part - back * along[:, 1] / lengths
     y = np.where(is_near & (part > 0.001) & (part < 0.999), y, np.inf)
-    # What fills bends may be nearer, seldom.
+    # Fillings of bends are nearer in rare cases.
     assert (places[:, 1] < y.min(axis=1) + 1e-4).all()
     is_segment = places[:, 1] > y.min(axis=1) - 1e-4
     assert is_segment.mean() > 0.9
