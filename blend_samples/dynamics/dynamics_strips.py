@@ -35,7 +35,7 @@ BALL_START = np.array([0.0, 0.03, 0.66]) - 0.06 * SCREEN_RIGHT  # [m]: in the ne
 
 @dataclass(frozen=True)
 class Strip:
-    """What is prepared in the open file, once for each row; the frames that are shown, of which the last ends it."""
+    """A strip of pictures: functions that prepare the open file for each row, and the frames shown, up to the last."""
 
     rows: tuple[Callable[[], None], ...]
     frames: tuple[int, ...]

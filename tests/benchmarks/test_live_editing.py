@@ -72,7 +72,7 @@ def on_gpu(hair):
 
 
 class View:
-    """What a viewport of 1280 × 720 pixels shows of the head while a stroke runs."""
+    """A viewport of 1280 × 720 pixels that shows the head while a stroke runs."""
 
     def __init__(self):
         self.picture = hair_picture.HairPicture((1280, 720))

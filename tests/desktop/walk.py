@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an artist does in a window: installs the extension, grows hair on the head, combs it, saves and loads.
+"""An artist's steps in a window: install the extension, grow hair on the head, comb it, save and load.
 
 Run by a desktop Blender as steps.py says, with one of `PARTS`; MORE is the folder of this Python's packages. Writes a
 picture of the screen for each step, and the outcome of the shaders' tests (twins.xml).

@@ -6,7 +6,7 @@ from ..data.made import chain_armatures
 
 
 class GltfHooks:
-    """What the exporter calls; it is only loaded while the add-on is enabled."""
+    """Hooks that the exporter calls; the exporter is loaded only while its add-on is enabled."""
 
     def gather_gltf_extensions_hook(self, gltf, _export_settings):
         """Add the springs to an exported file before it is written."""

@@ -335,7 +335,7 @@ def flatten(surface, is_flat):
 
 @pytest.mark.parametrize("is_combed", [False, True])
 def test_hair_waits_while_the_surface_has_a_scale_of_zero(hair, is_combed):
-    """What is changed while the scale is zero is followed once it is not: settings, combing and the mesh itself."""
+    """Changes of settings, guides and the mesh while the scale is zero are followed once it is not zero."""
     surface, guides = hair.data.surface, bpy.data.objects["Guides"]
     if is_combed:
         write_points(guides, points(guides) + np.float32(0.01))

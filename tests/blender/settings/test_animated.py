@@ -169,7 +169,7 @@ def rendered():
 
 
 def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):
-    """What a script keys and drives is in its first render without an update, as Blender changes the frame before it
+    """A script's keys and drivers act in its first render without an update, as Blender changes the frame before it
     renders.
     """
     drive(hair, "vellus.hair.radius")
@@ -192,8 +192,8 @@ def test_a_driver_that_a_file_has_computes_nothing_again_when_it_is_opened(hair,
 
 
 def test_what_a_script_sets_before_a_window_shows_its_file_is_in_the_hair(hair, monkeypatch):
-    """What a script sets before a window shows its file is in the hair, as the first update in a window reports
-    everything.
+    """Settings that a script writes before a window shows its file are in the hair, as the first update in a window
+    reports everything.
     """
     monkeypatch.setattr(handlers, "_is_opening", True)
     hair.data.vellus.hair.radius = 0.025

@@ -18,7 +18,7 @@ def wave(wavelength, size=2e-4, length=1.0, point_count=241):
 
 @pytest.mark.parametrize("part", [0.25, 0.5, 0.75, 1.0])
 def test_what_is_left_of_a_wave_is_sinc_squared(part):
-    """What is left of a wave is sinc squared, away from the ends, where less strand is averaged."""
+    """Smoothing scales a wave by sinc squared, except near the ends, where it averages less of the strand."""
     strand = wave(0.1)
     made = stepped(strand, smooth.Settings(length=0.1 * part))
     inner = slice(60, 180)

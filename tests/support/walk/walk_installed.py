@@ -140,7 +140,7 @@ def _scripts(folder):
 
 
 def _draw_coarse_shadows():
-    """As in other processes that tests start: the pictures are small, and their maps take longer than all else."""
+    """Make shadow maps coarse, as in other processes of tests: they take longest of all in small pictures."""
     coarse = runpy.run_path(str(COARSE))
     for name, change in coarse["CHANGES"].items():
         change(importlib.import_module(f"{MODULE}.{name}"))

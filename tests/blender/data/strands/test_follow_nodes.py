@@ -341,7 +341,7 @@ def test_nodes_are_built_where_their_file_cannot_be_read(scene, monkeypatch, tmp
 
 
 def test_reading_the_nodes_is_no_import_of_hair(hair, monkeypatch, tmp_path):
-    """What changed before hair is made stays to be followed; hair that is appended is shown and has readable names."""
+    """Changes from before hair is made are still followed; appended hair is shown and has readable names."""
     imports = []
     monkeypatch.setattr(handlers, "_show_hidden", lambda: imports.append("hair"))
     path = str(tmp_path / "hair.blend")

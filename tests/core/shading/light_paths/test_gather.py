@@ -453,7 +453,7 @@ def test_voxels_without_paths_take_the_ratio_around_them(rng):
 
 
 def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
-    """Where drawn light has the edge of the paths' light, few paths give the brightness of both sides."""
+    """At a common edge of drawn light and traced light, few paths give the brightness of both sides."""
     even = np.ones((8, 8, 8, 3))
     drawn = np.where(np.arange(8) < 3, 0.2, 1.0)[:, None] * even
     expected = 0.6 * drawn + 0.3 * even
