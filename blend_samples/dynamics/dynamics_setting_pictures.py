@@ -73,7 +73,7 @@ def curl(length=0.15, turns=5, radius=0.012):
 
 
 def ball(radius, center):
-    """Return (vertices, triangles) of a sphere, and what it fills in the picture."""
+    """Return (vertices, triangles, function (x, y) that tells whether a place of the picture is in the sphere)."""
     rows, columns = 24, 48
     polar, around = np.meshgrid(np.linspace(0.0, np.pi, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1)[:-1])
     sphere = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
