@@ -26,7 +26,7 @@ def to_world(an_object, depsgraph=None):
 def is_flattened(an_object):
     """Whether an object's scale is zero along an axis or its transform is not finite: nothing can be placed on it."""
     to_world_axes = np.array(an_object.matrix_world.to_3x3(), np.float64)
-    return not np.isfinite(to_world_axes).all() or abs(np.linalg.det(to_world_axes)) < 1e-30
+    return not np.isfinite(to_world_axes).all() or bool(abs(np.linalg.det(to_world_axes)) < 1e-30)
 
 
 def between(an_object, surface_object):

@@ -379,7 +379,7 @@ def restyle(
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
     """Regenerate Curves from their stored settings and inputs. Errors become their status.
 
-    Combed Curves do not change: only an operator replaces them.
+    Combed Curves do not change: only an operator replaces them. Curves stay stale while the surface's scale is zero.
     """
     state = target.vellus
     state.is_stale = False
@@ -392,6 +392,7 @@ def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
             interpolate_hair(*inputs_of(target), depsgraph, target)
     except HairError as error:
         state.status = str(error)
+        state.is_stale = target.surface is not None and surface_space.is_flattened(target.surface)
 
 
 def _is_restyled(target, depsgraph):

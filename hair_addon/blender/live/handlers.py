@@ -259,8 +259,8 @@ def _evaluate_hair(hair, depsgraph, combed):
     if not (state.is_live and _is_ready(hair, depsgraph)):
         # Guides that are reported for the first time may be the guides that the hair was made with.
         state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
-    elif (state.is_stale or follows) and flattened_surfaces.is_waiting(hair):
-        state.is_stale = True
+    elif state.is_stale and flattened_surfaces.is_waiting(hair):
+        pass
     elif state.is_stale and not live_hair.is_ahead(hair):
         with _once(hair):
             live_hair.regenerate(hair, depsgraph)

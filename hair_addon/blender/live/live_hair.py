@@ -10,6 +10,7 @@ import sys
 import bpy
 
 from ...core.errors import HairError
+from ..data import surface_space
 from ..data.strands import curves, simulated_guides
 from ..groom import (
     bindings,
@@ -152,7 +153,7 @@ def regenerate(hair, depsgraph):
         size_fitting.show(hair, bound.settings, bound.fits)
         _follow_simulated(hair)
     except HairError as error:
-        hair.vellus.is_stale = False
+        hair.vellus.is_stale = hair.surface is not None and surface_space.is_flattened(hair.surface)
         hair.vellus.status = str(error)
         return
     events.strands_computed(hair)
