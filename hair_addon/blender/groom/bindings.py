@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from bpy.types import Curves, Depsgraph
+from bpy.types import Curves, Depsgraph, Object
 
 from ...core import interpolation
 from ...core.errors import memory_as_sentence
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from ...core.interpolation.guide_weights import Reach
 
 T = TypeVar("T")
+
+_SAME_SCALE = 1e-5  # tolerance of squared scales: Blender's matrices have single precision
 
 
 @dataclass
@@ -261,6 +263,20 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
 def of(datablock: Curves) -> BoundHair | None:
     """Return the `BoundHair` of a hair Curves datablock, or None."""
     return binding_cache.get(datablock.session_uid)
+
+
+def has_scale(bound: BoundHair, surface_object: Object | None) -> bool:
+    """Whether a surface has the scale that hair was bound at, as styles and spacings are in meters; it may be turned.
+
+    True for a deleted surface, which has no other scale.
+    """
+    if surface_object is None:
+        return True
+    present, known = np.array(surface_object.matrix_world.to_3x3(), np.float64), bound.surface.to_world_axes
+    if not np.isfinite(present).all() or (np.linalg.det(present) < 0.0) != (np.linalg.det(known) < 0.0):
+        return False
+    squares, known_squares = present.T @ present, known.T @ known
+    return bool(np.allclose(squares, known_squares, rtol=_SAME_SCALE, atol=_SAME_SCALE * np.abs(known_squares).max()))
 
 
 def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:

@@ -31,7 +31,7 @@ def rebound(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     weighing, others = ({name: getattr(settings, name) for name in names} for names in (_WEIGHING, _AFTER_WEIGHING))
     if replace(known.settings, **weighing, **others) != settings:
         return None
-    if not bindings.can_read_masks(known, target, depsgraph):
+    if not (bindings.has_scale(known, guide_curves.surface) and bindings.can_read_masks(known, target, depsgraph)):
         return None
     if settings.neighbour_limit >= known.binding.candidates.indices.shape[1]:
         return None

@@ -359,6 +359,8 @@ def restyle(
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
+    if not bindings.has_scale(bound, guide_curves.surface):
+        return False
     if not bindings.can_read_masks(bound, target, depsgraph):  # rebinding the hair reports the error
         return False
     device = bound.binding.positions.device

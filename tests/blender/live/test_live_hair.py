@@ -365,3 +365,23 @@ def test_hair_waits_while_the_surface_has_a_scale_of_zero(hair, is_combed):
 def _distance_to(surface, roots):
     """Return the largest distance of (N, 3) points to a mesh, in its coordinates."""
     return max((surface.closest_point_on_mesh(root)[1] - Vector(root)).length for root in roots)
+
+
+@pytest.mark.parametrize(
+    ("scale", "angle"),
+    [((2.0, 2.0, 2.0), 0.0), ((0.5, 1.0, 1.7), 0.6), ((-1.0, 1.0, 1.0), 0.0), ((1.0, 1.0, 1.0), 0.8)],
+)
+def test_styles_have_the_present_scale_of_the_surface(hair, scale, angle):
+    """A changed style of hair on a surface that was scaled since gives the same strands as hair that is bound anew."""
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.add_style(style="CLUMP")
+    bpy.ops.vellus.add_style(style="CURL")
+    surface = hair.data.surface
+    surface.scale, surface.rotation_euler.z = scale, angle
+    update()
+    hair.data.vellus.styles[1].curl.radius = 0.03
+    update()
+    followed = points(hair)
+    bindings.invalidate(hair.data)
+    pipeline.evaluate(hair.data, bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_allclose(points(hair), followed, rtol=0.0, atol=1e-5)
