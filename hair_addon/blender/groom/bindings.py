@@ -20,6 +20,7 @@ from ...core.grooming import following, groom
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
 from ..data import scene
+from ..data.strands import curves
 from ..data.surfaces import Surface, cage_of
 from ..host.caches import Cache
 from ..settings import map_items, style_items
@@ -281,11 +282,12 @@ def has_scale(bound: BoundHair, surface_object: Object | None) -> bool:
 
 def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether the surface has the level of subdivision that hair is bound at, or no masks or maps depend on it."""
-    if target.surface is None or target.surface.type != "MESH":
+    surface_object = curves.grown_on(target)
+    if surface_object is None or surface_object.type != "MESH":
         return False
     if not style_items.have_masks(target.vellus) and not map_items.read_faces(target.vellus):
         return True
-    present, known = scene.read_surface(target.surface, depsgraph).cage.topology, bound.surface.topology
+    present, known = scene.read_surface(surface_object, depsgraph).cage.topology, bound.surface.topology
     return present == known or cage_of(present) != cage_of(known)
 
 

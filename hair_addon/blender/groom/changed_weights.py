@@ -26,7 +26,7 @@ def rebound(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     guide_curves, settings = pipeline.inputs_of(target)
     if known is None or known.guide_uid != guide_curves.session_uid or known.straight is not None:
         return None
-    if known.free is not None or target.surface is None:
+    if known.free is not None or guide_curves.surface is None:
         return None
     weighing, others = ({name: getattr(settings, name) for name in names} for names in (_WEIGHING, _AFTER_WEIGHING))
     if replace(known.settings, **weighing, **others) != settings:
@@ -40,7 +40,7 @@ def rebound(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     if following.combed(guides, known.guides) is None:
         return None
     styles = style_items.styles_of(target.vellus)
-    read = styled_hair.read_styles(styles, target.surface, known.surface, guide_curves, depsgraph, target)
+    read = styled_hair.read_styles(styles, guide_curves.surface, known.surface, guide_curves, depsgraph, target)
     if not read.is_same(known.styles.read):
         return None
     if replace(known.settings, **others) == settings:

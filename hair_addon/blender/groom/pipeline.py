@@ -369,7 +369,7 @@ def restyle(
     if combed is None or len(combed):
         return False
     styles = style_items.styles_of(target.vellus)
-    read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph, target)
+    read = styled_hair.read_styles(styles, guide_curves.surface, bound.surface, guide_curves, depsgraph, target)
     if not read.is_same(bound.styles.read):
         trees = bound.styles.shared_trees()
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)

@@ -78,8 +78,9 @@ def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
     if not partings.is_wanted(target.vellus.hair) or target.surface is None:
         return False
     settings = setting_properties.to_settings(target.vellus.hair, groom.HairSettings)
-    surface = scene.read_surface(target.surface, depsgraph).cage
-    parting = partings.read(target.surface, surface, target.vellus.guide_curves, settings, depsgraph)
+    surface_object = curves.grown_on(target)
+    surface = scene.read_surface(surface_object, depsgraph).cage
+    parting = partings.read(surface_object, surface, target.vellus.guide_curves, settings, depsgraph)
     return parting.key != target.vellus.parting_key
 
 
@@ -103,5 +104,5 @@ def _placing(target, depsgraph):
         (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)
     )
     settings = setting_properties.to_settings(group, settings_class)
-    density = scene.read_cage_weights(target.surface, depsgraph, mask.group)
+    density = scene.read_cage_weights(curves.grown_on(target), depsgraph, mask.group)
     return settings, density, scene.read_image(mask.image)

@@ -7,6 +7,7 @@ from bpy.types import Curves
 from ...core.errors import HairError
 from ...core.params import Param
 from ..data.maps import ramps, sources
+from ..data.strands import curves
 from ..settings import map_items
 from . import bindings
 from .bindings import BoundHair
@@ -22,7 +23,7 @@ def strands_of(hair: Curves, bound: BoundHair) -> sources.Strands:
     identities, randoms = bound.binding.identities
     return sources.Strands(
         hair,
-        hair.surface,
+        curves.grown_on(hair),
         bound.surface,
         bound.binding.roots,
         identities,

@@ -249,7 +249,7 @@ def is_ahead(hair):
     return (
         strand_thickness.is_same(hair, bound)
         and bound.styles.read.styles == styles
-        and bound.styles.read.has_maps(*styled_hair.read_maps(hair, hair.surface, bound.surface, styles))
+        and bound.styles.read.has_maps(*styled_hair.read_maps(hair, guide_curves.surface, bound.surface, styles))
     )
 
 
@@ -338,7 +338,7 @@ def follow_masks(surfaces, depsgraph):
 
 
 def _is_painted(hair, surfaces):
-    return hair.surface in surfaces and style_items.have_masks(hair.vellus)
+    return curves.grown_on(hair) in surfaces and style_items.have_masks(hair.vellus)
 
 
 def _is_set_while_painting(hair):

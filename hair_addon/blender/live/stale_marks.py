@@ -51,7 +51,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus
-        if hair.surface != surface_object or state.kind != "HAIR":
+        if curves.grown_on(hair) != surface_object or state.kind != "HAIR":
             continue
         if not state.is_live:
             state.is_stale = state.is_stale or state.guide_curves not in carried
@@ -151,7 +151,7 @@ def follow_flow(changed, transformed, depsgraph):
 
 def _parts_by(hair, changed, transformed):
     state = hair.vellus
-    if drawn_lines.have_moved(text_of(state.hair, "part_lines"), hair.surface, changed, transformed):
+    if drawn_lines.have_moved(text_of(state.hair, "part_lines"), curves.grown_on(hair), changed, transformed):
         return True
     # Guides are read with each step of a stroke, so only if they have a region attribute.
     guides = state.guide_curves
@@ -197,7 +197,7 @@ def follow_mapped_images(images):
 def follow_mapped_surfaces(surfaces):
     """Mark hair whose settings vary by weights or attributes of any of some surfaces, which may have been painted."""
     for mapped, item in _mapped() if surfaces else ():
-        if mapped.surface in surfaces and item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
+        if curves.grown_on(mapped) in surfaces and item.kind in {"GROUP", "ATTRIBUTE", "IMAGE"}:
             marks.mark_changed_map(item)
 
 
@@ -239,7 +239,7 @@ def follow_styles(changed):
         if state.kind != "HAIR" or not state.styles:
             continue
         named = style_items.objects_named(state)
-        if named and (hair.surface in changed or any(bpy.data.objects.get(name) in changed for name in named)):
+        if named and (curves.grown_on(hair) in changed or any(bpy.data.objects.get(name) in changed for name in named)):
             state.is_stale = True
 
 

@@ -368,6 +368,12 @@ def followers(guide_curves):
     return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
 
 
+def grown_on(hair):
+    """Return the object that Curves grow on: the surface of the guides of generated hair, else their own surface."""
+    guides = None if hair.vellus.kind != "HAIR" or is_hand_made(hair) else hair.vellus.guide_curves
+    return hair.surface if guides is None or guides.surface is None else guides.surface
+
+
 def follows_library(hair):
     """Whether hair Curves or their guides are linked, or library overrides."""
     return any(attributes.is_from_library(c) for c in (hair, hair.vellus.guide_curves) if c is not None)
