@@ -26,7 +26,8 @@ def make_hair_cards(
     """Create cards of hair, with textures of its strands; returns a mesh object for each level, finest first.
 
     hair: hair Curves; settings: `CardSettings`; folder: for the textures' .png files, None packs them into the .blend
-    file; changes: fields of `CardSettings` by name.
+    file; changes: fields of `CardSettings` by name. With error_measure "MEASURED" or "MINIMIZED", the objects have the
+    properties "coverage_error" and "flip_error", from 0 to 1.
 
     >>> settings = {"card_count": 60, "segment_count": 4, "level_count": 2, "texture_size": 256}
     >>> cards, fewer = api.make_hair_cards(bpy.data.objects["Hair"], **settings)

@@ -40,4 +40,8 @@ def _cards(given, console, hair, settings):
     levels = run_now(blender.io.hair_cards.making_cards(hair, settings, folder), console.progress)
     counts = {"cards": levels[0].card_count, "pictures": levels[0].picture_count, "levels": len(levels)}
     counts["triangles"] = [level.triangle_count for level in levels]
+    if levels[0].error is not None:
+        counts["errors"] = [
+            {"coverage": round(level.error.coverage, 4), "flip": round(level.error.flip, 4)} for level in levels
+        ]
     return [level.mesh_object for level in levels], counts, levels[0].notes

@@ -37,7 +37,16 @@ def make(given, console, made_of):
     blender.io.mesh_export.write(given.out, objects)
     seconds = time.perf_counter() - started
     values = {"verb": given.run.__module__.rpartition(".")[2], "input": str(given.input), "out": str(given.out)}
-    sentence = f"{len(objects)} meshes in {seconds:.2f} s: {given.out}"
+    sentence = "".join(f"{line}\n" for summary in summaries for line in _errors(summary))
+    sentence += f"{len(objects)} meshes in {seconds:.2f} s: {given.out}"
     console.result(
         values | {"made": summaries, "bytes": given.out.stat().st_size, "seconds": round(seconds, 3)}, sentence
     )
+
+
+def _errors(summary):
+    """Return a line for each level of cards whose error was measured."""
+    return [
+        f"{summary['hair']}, level {index}: errors: coverage {error['coverage']:.3f}, FLIP {error['flip']:.3f}"
+        for index, error in enumerate(summary.get("errors", ()))
+    ]

@@ -34,6 +34,16 @@ def test_cards_go_into_a_file_with_their_textures(shot):
     assert sorted(p.name for p in shot.parent.iterdir()) == ["cards.glb", "shot.blend"]
 
 
+def test_errors_of_cards_are_printed(shot):
+    """The errors of each level are a line of the result, and values of --json."""
+    words = ("--cards", "10", "--segment-count", "2", "--texture-size", "128", "--error-measure", "MEASURED")
+    ended = run_here("cards", shot, "--out", "//cards.glb", *words)
+    assert ended.out.startswith("Hair, level 0: errors: coverage 0.") and "FLIP 0." in ended.out.splitlines()[0]
+    (told,) = run_here("cards", shot, "--out", "//cards.glb", *words, "--json").results
+    (error,) = told["made"][0]["errors"]
+    assert set(error) == {"coverage", "flip"} and all(0.0 < value < 1.0 for value in error.values())
+
+
 def test_textures_lie_beside_files_that_have_none(shot):
     words = ("--cards", "10", "--texture-size", "128")
     ended = run_here("cards", shot, "--out", "//out/cards.obj", *words)

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.cards import atlas, outlines, ribbons, texels
+from ...core.cards import texels
+from ...core.cards.best_placement import best_placement
+from ...core.cards.card_error import CardError, Comparison
+from ...core.cards.card_layout import CardStrands, Placement, laid_cards
 from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.errors import HairError
 from ...core.files import file_names
 from ...core.files.atomic_file import require_writable_path
-from ...core.geometry.search import clusters
 from ...core.long_work import Stage, part_of
 from ..data import whole_changes
 from ..data.made import card_images, made_meshes
@@ -23,7 +25,7 @@ from . import hair_meshes
 class CardLevel:
     """A finished level of detail: its object, {map: image}, and numbers of cards, pictures and triangles.
 
-    notes: on omitted parts of the hair.
+    error: beside the strands, or None if it was not measured; notes: on omitted parts of the hair.
     """
 
     mesh_object: object
@@ -31,6 +33,7 @@ class CardLevel:
     card_count: int
     picture_count: int
     triangle_count: int
+    error: CardError | None
     notes: list[HairError]
 
 
@@ -42,6 +45,7 @@ class _Drawn:
     maps: dict
     card_count: int
     picture_count: int
+    error: CardError | None
 
 
 @whole_changes.whole
@@ -57,23 +61,32 @@ def making_cards(hair, settings, folder=None):
         require_writable_path(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
+    strands = CardStrands(read.points, read.radii, read.colors(), read.surface)
+    comparison = None
+    if settings.error_measure != "OFF":
+        comparison = yield lambda progress: Comparison(strands, progress)
     levels = settings.levels(len(read.points))
     areas = np.cumsum([0] + [level.texture_size**2 for level in levels])
     parts = (areas / areas[-1]).tolist()
     drawn = []
     for index, level in enumerate(levels):
-        drawn.append((yield from _drawing(read, level, settings.picture_count, parts[index : index + 2])))
+        drawn.append((yield from _drawing(strands, comparison, level, settings, parts[index : index + 2])))
     joints = yield lambda _progress: read.joints(settings)
     return _written(read, drawn, joints, folder)
 
 
-def _drawing(read, level, picture_count, parts):
-    """Draw a level, as work in steps; parts: (first, last) of the total progress."""
+def _drawing(strands, comparison, level, settings, parts):
+    """Draw a level, as work in steps; comparison: or None; parts: (first, last) of the total progress."""
     first, last = parts
-    interval = first, first + 0.1 * (last - first)
-    flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *interval))
-    mesh, placed, drawn_count = flat
-    yield Stage("Drawing cards", interval[1])
+    middle = first + 0.1 * (last - first)
+    choice = settings, Placement()
+    if settings.error_measure == "MINIMIZED":
+        choice = yield lambda progress: best_placement(
+            comparison, strands, level, settings, part_of(progress, first, middle)
+        )
+    laid = yield lambda progress: laid_cards(strands, level, *choice, part_of(progress, first, middle))
+    placed = laid.strands
+    yield Stage("Drawing cards", middle)
     picture = card_pictures.CardPicture(placed, level.texture_size)
     sums = texels.TexelSums(level.texture_size)
     for turn in range(card_pictures.PASSES):
@@ -83,30 +96,14 @@ def _drawing(read, level, picture_count, parts):
             segments, shift = picture.segments(rows, turn)
             yield _adding(sums, segments, placed, shift, rows)
     maps = yield lambda _progress: sums.maps()
-    return _Drawn(mesh, maps, level.card_count, drawn_count)
+    error = None
+    if comparison is not None:
+        error = yield lambda _progress: comparison.error_of(laid.mesh, maps)
+    return _Drawn(laid.mesh, maps, level.card_count, laid.picture_count, error)
 
 
 def _adding(sums, segments, placed, shift, rows):
     return lambda _progress: sums.add(segments, placed, card_pictures.PER_SIDE, shift, rows)
-
-
-def _flat_cards(read, level, picture_count, progress):
-    """Compute the cards; returns (mesh beside the surface, `PlacedStrands`, number of pictures)."""
-    count = level.card_count
-    labels = clusters.clusters(clusters.strand_features(read.points), count, progress)
-    progress("Making cards", 1.0)
-    axes = ribbons.axes_of(read.points, labels, count, level.segment_count, read.surface)
-    flat = ribbons.flattened(read.points, labels, axes)
-    found = outlines.outlines(flat, read.radii, labels, axes)
-    lifted = outlines.heights(flat, labels, found)
-    flat = outlines.levelled(flat, labels, found, lifted)
-    places = atlas.atlas(found, np.bincount(labels, minlength=count), picture_count, level.texture_size)
-    strands, points, radii = places.placed(flat, read.radii, labels, found.boxes)
-    heights = float(points[..., 2].min()), float(points[..., 2].max())
-    ids = np.random.default_rng(0).permutation(len(strands)) / max(len(strands) - 1, 1)
-    placed = texels.PlacedStrands(points, radii, read.colors()[strands], ids.astype(np.float32), heights)
-    mesh = outlines.ribbon_mesh(axes, found, places.uvs(found), lifted)
-    return mesh, placed, len(places.shown)
 
 
 def _stem(name, taken):
@@ -131,7 +128,9 @@ def _written(read, drawn, joints, folder):
         mesh_object = pieces.new_object(title, level.mesh, material, level.card_count, 2)
         if index:
             made_meshes.hide(mesh_object)
+        if level.error is not None:
+            mesh_object["coverage_error"], mesh_object["flip_error"] = level.error.coverage, level.error.flip
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
-        made.append(CardLevel(mesh_object, its, *counts, read.notes))
+        made.append(CardLevel(mesh_object, its, *counts, level.error, read.notes))
     card_images.keep(images, folder, stem)  # last: replaced files cannot be restored
     return made

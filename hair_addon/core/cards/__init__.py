@@ -8,9 +8,14 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         atlas,
+        best_placement,
         bone_chains,
+        card_error,
+        card_layout,
         card_settings,
+        card_views,
         curve_frames,
+        nearest_triangles,
         outlines,
         polygon_mesh,
         ribbons,

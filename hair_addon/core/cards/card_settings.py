@@ -52,6 +52,40 @@ class CardSettings(Settings):
         low=0,
         high=50_000,
     )
+    crossed: float = param(
+        0.0,
+        "Part of the clumps that have a second card at a right angle to the first, thickest clumps first",
+        label="Crossed Cards",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    flyaways: float = param(
+        0.0,
+        "Part of the cards that show single strands, which stand out from their clump",
+        label="Flyaways",
+        low=0.0,
+        high=0.9,
+        subtype="FACTOR",
+    )
+    caps: float = param(
+        0.0,
+        "Part of the cards that lie on the surface and show the roots, so that less skin is visible",
+        label="Caps",
+        low=0.0,
+        high=0.9,
+        subtype="FACTOR",
+    )
+    error_measure: str = param(
+        "OFF",
+        "Comparison of the cards with the strands, from six sides and at three distances",
+        label="Error Measure",
+        choices=(
+            ("OFF", "Not Measured", "The cards are not compared with the strands"),
+            ("MEASURED", "Measured", "Report how much the pictures of cards and of strands differ"),
+            ("MINIMIZED", "Minimized", "Try several placements of the same number of cards, and use the best"),
+        ),
+    )
     texture_size: int = param(
         2048, "Width and height of the textures in pixels; a power of two suits most engines", low=128, high=8192
     )
@@ -73,6 +107,13 @@ class CardSettings(Settings):
             size = max(self.texture_size >> index, 128)
             found.append(Level(cards, max(self.segment_count >> index, 1), size))
         return found
+
+    def parts_of(self, card_count: int) -> tuple[int, int, int]:
+        """Return how many of a number of cards are crossed cards, flyaways and caps; at least one other is left."""
+        flyaways = min(int(self.flyaways * card_count), card_count - 1)
+        caps = min(int(self.caps * card_count), card_count - 1 - flyaways)
+        crossed = int((card_count - flyaways - caps) * self.crossed / (1.0 + self.crossed))
+        return crossed, flyaways, caps
 
     def require_size(self, strand_count: int) -> None:
         """Raise `HairError` if a mesh would have too many triangles."""

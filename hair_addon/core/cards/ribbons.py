@@ -10,7 +10,6 @@ from ..geometry.mesh import TriMesh, interpolate
 from ..geometry.search import clusters
 from . import curve_frames
 
-_OUTWARD = 2.0  # weight of facing away from the surface, relative to following the spread of a clump
 _WINDOW = 0.3  # of the length: keeps strands in order along ribbons that return to themselves
 _TINY = 1e-9
 
@@ -39,17 +38,30 @@ class Axes:
         cosines, sines = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
         return Axes(self.centres, self.tangents, cosines * self.normals + sines * self.binormals)
 
+    def chosen(self, ribbons: np.ndarray) -> "Axes":
+        """Return the axes of some ribbons, by index."""
+        return Axes(self.centres[ribbons], self.tangents[ribbons], self.normals[ribbons])
 
-def axes_of(points: np.ndarray, labels: np.ndarray, count: int, segment_count: int, surface: TriMesh) -> Axes:
+
+def joined(parts: list[Axes]) -> Axes:
+    """Return the axes of all ribbons of several, with the same number of points."""
+    return Axes(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("centres", "tangents", "normals"))
+    )
+
+
+def axes_of(
+    points: np.ndarray, labels: np.ndarray, count: int, segment_count: int, surface: TriMesh, outward: float = 2.0
+) -> Axes:
     """Return the middle lines of `count` clumps of strands (S, P, 3); labels: (S,) clump of each strand.
 
     A line is the mean of the strands of a clump, resampled by curvature. Normals point in the direction of least
-    spread, away from the surface.
+    spread, away from the surface; outward: weight of the latter relative to the former.
     """
     means = clusters.cluster_means(points, labels, count)
     centres = curve_frames.resample_by_curvature(means, segment_count + 1)
     axes = Axes(centres, curve_frames.tangents(centres), curve_frames.steady_normals(centres))
-    return axes.turned(_angles(points, labels, count, axes, _away(centres, surface)))
+    return axes.turned(_angles(points, labels, count, axes, _away(centres, surface), outward))
 
 
 def _away(places, surface):
@@ -58,7 +70,7 @@ def _away(places, surface):
     return curve_frames.unit(interpolate(surface.vertex_normals, surface, nearest)).reshape(places.shape)
 
 
-def _angles(points, labels, count, axes, away):
+def _angles(points, labels, count, axes, away, outward):
     """Return rotation angles (C,) [rad] that turn normals to the least eigenvector of spread minus outward facing."""
     flat = flattened(points, labels, axes)
     across = flat[..., [2, 0]].astype(np.float64)  # along the normal and the binormal
@@ -66,8 +78,8 @@ def _angles(points, labels, count, axes, away):
     spread = clusters.cluster_means(moments, labels, count)
     spread /= np.maximum(np.trace(spread, axis1=1, axis2=2), _TINY**2)[:, None, None]
     facing = np.stack([(away * axes.normals).sum(-1), (away * axes.binormals).sum(-1)], axis=-1)
-    outward = np.einsum("cni,cnj->cij", facing, facing) / facing.shape[1]
-    vectors = np.linalg.eigh(spread - _OUTWARD * outward)[1][:, :, 0]
+    toward = np.einsum("cni,cnj->cij", facing, facing) / facing.shape[1]
+    vectors = np.linalg.eigh(spread - outward * toward)[1][:, :, 0]
     vectors *= np.where(np.einsum("ci,cni->c", vectors, facing) < 0.0, -1.0, 1.0)[:, None]
     return np.arctan2(vectors[:, 1], vectors[:, 0])
 

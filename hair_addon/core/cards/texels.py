@@ -13,7 +13,8 @@ NO_STRAND = -1
 class PlacedStrands:
     """Strands in a texture: places (M, P, 3) from 0 to 1 with heights, radii (M, P), linear colors (M, P, 3), ids (M,).
 
-    heights: the lowest and the highest height in the same unit, which have the depths 0 and 1.
+    heights: the lowest and the highest height in the same unit, which have the depths 0 and 1; reaches: (M,) part of
+    each strand's length, from the root, that is in the texture, or None for whole strands.
     """
 
     places: np.ndarray
@@ -21,6 +22,7 @@ class PlacedStrands:
     colors: np.ndarray
     ids: np.ndarray
     heights: tuple[float, float]
+    reaches: np.ndarray | None = None
 
 
 class TexelSums:
@@ -86,7 +88,10 @@ def _sampled(strands, segments, centres, texel):
     normals = _normals(edge, roundness * np.clip(across / np.maximum(radius, 1e-12), -1.0, 1.0))
     low, high = strands.heights
     depth = (first[:, 2] + part * edge[:, 2] - low) / max(high - low, 1e-12)
-    return np.stack([*colors.T, *normals.T, depth, (piece + part) / pieces, strands.ids[strand]])
+    along = (piece + part) / pieces
+    if strands.reaches is not None:
+        along = along * strands.reaches[strand]
+    return np.stack([*colors.T, *normals.T, depth, along, strands.ids[strand]])
 
 
 def _normals(edges, across):

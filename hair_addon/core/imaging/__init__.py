@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import ambient_cube, cryptomatte, environment, lamps, panorama, picture_checks, pixel_sampling, thin_lens
+    from . import (
+        ambient_cube,
+        cryptomatte,
+        environment,
+        flip,
+        lamps,
+        panorama,
+        picture_checks,
+        pixel_sampling,
+        thin_lens,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -11,7 +11,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.io import hair_cards
 from hair_addon.blender.render import card_pictures
-from hair_addon.core.cards import texels
+from hair_addon.core.cards import best_placement, texels
 from hair_addon.core.cards.card_settings import CardSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
@@ -209,3 +209,24 @@ def test_what_cannot_be_made_is_refused_and_leaves_nothing(hair, tmp_path):
     with pytest.raises(HairError, match="no surface"):
         api.make_hair_cards(hair)
     assert (len(bpy.data.objects), len(bpy.data.images)) == count
+
+
+def test_the_error_of_cards_is_reported_and_can_be_minimized(hair, monkeypatch):
+    """Cards have their error as properties, less of it with a chosen placement, for the same number of triangles."""
+    for name, values in (("_CROSSED", (1.0,)), ("_OUTWARD", ()), ("_TIP", ())):
+        monkeypatch.setattr(best_placement, name, values)
+    settings = {"card_count": 60, "segment_count": 3, "texture_size": SIZE}
+    (plain,) = api.make_hair_cards(hair, **settings)
+    assert "flip_error" not in plain
+    (measured,) = api.make_hair_cards(hair, **settings, error_measure="MEASURED")
+    (best,) = api.make_hair_cards(hair, **settings, error_measure="MINIMIZED")
+    np.testing.assert_array_equal(coordinates(measured.data), coordinates(plain.data))
+    assert len(best.data.polygons) == len(plain.data.polygons)
+    errors = [one["coverage_error"] + one["flip_error"] for one in (measured, best)]
+    assert 0.0 < errors[1] < errors[0] < 2.0
+
+
+def test_crossed_cards_flyaways_and_caps_are_part_of_the_cards(hair):
+    settings = {"card_count": 20, "segment_count": 2, "texture_size": SIZE}
+    made = api.make_hair_cards(hair, **settings, crossed=0.5, flyaways=0.2, caps=0.2)
+    assert len(made[0].data.polygons) == 40 and not made[0].data.validate()

@@ -160,7 +160,12 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
 
     def message(self, made):
         counts = {"cards": made[0].card_count, "pictures": made[0].picture_count, "triangles": made[0].triangle_count}
-        return "{cards} cards with {pictures} pictures, {triangles:,} triangles", counts
+        error = made[0].error
+        if error is None:
+            return "{cards} cards with {pictures} pictures, {triangles:,} triangles", counts
+        errors = {"coverage": error.coverage, "flip": error.flip}
+        text = "{cards} cards, {triangles:,} triangles; errors: coverage {coverage:.3f}, FLIP {flip:.3f}"
+        return text, counts | errors
 
 
 class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):

@@ -12,7 +12,7 @@ from hair_addon.blender.data.pictures import viewport_shading
 from hair_addon.blender.gpu import display_transform
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture
-from tests.support.pictures.flip import flip
+from hair_addon.core.imaging.flip import flip
 from tests.support.pictures.viewports import view3d
 from tests.support.scenes import COARSE_WORLD, set_world_maps
 

@@ -2,7 +2,6 @@
 """The visible difference between two pictures that are flipped back and forth: LDR-FLIP [Andersson20]."""
 
 import numpy as np
-from scipy.ndimage import convolve1d
 
 PIXELS_PER_DEGREE = 67.0  # a 4K monitor 0.7 m wide at a distance of 0.7 m
 
@@ -16,7 +15,7 @@ _COLOR_EXPONENT, _COLOR_KNEE, _COLOR_KNEE_TO = 0.7, 0.4, 0.95
 _FEATURE_WIDTH, _FEATURE_EXPONENT = 0.082, 0.5  # of edges and points, in degrees
 
 
-def flip(reference, other):
+def flip(reference: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return (H, W) errors between 0 and 1 of two (H, W, 3) pictures in sRGB display values between 0 and 1."""
     references, others = (_opponent(_linear(np.clip(one, 0.0, 1.0))) for one in (reference, other))
     color = _color_error(references, others)
@@ -68,7 +67,18 @@ def _filtered(opponent):
 
 
 def _separable(values, along, across):
-    return convolve1d(convolve1d(values, along, axis=1, mode="nearest"), across, axis=0, mode="nearest")
+    """Return values (H, W) convolved with odd kernels along rows and across them; the border is repeated."""
+    return _convolved(_convolved(values.T, along).T, across)
+
+
+def _convolved(values, kernel):
+    """Return values (H, W) convolved with a kernel along the first axis."""
+    radius, count = len(kernel) // 2, len(values)
+    padded = np.pad(values, ((radius, radius), (0, 0)), mode="edge")
+    found = np.zeros(values.shape)
+    for step, weight in enumerate(kernel[::-1]):
+        found += weight * padded[step : step + count]
+    return found
 
 
 def _hunt(linear):

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Placement of cards: clumps of strands, crossed cards, flyaways and caps, with their mesh and pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.mesh import TriMesh
+from ..geometry.search import clusters
+from ..long_work import Progress, no_progress
+from . import atlas, outlines, ribbons
+from .card_settings import CardSettings, Level
+from .nearest_triangles import NONE, Samples
+from .polygon_mesh import PolygonMesh
+from .texels import NO_STRAND, PlacedStrands
+
+_CAP_REACH = 0.25  # part of the strands, from the root, on cards that lie on the surface
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Parameters of the placement of cards; the error measure chooses among several.
+
+    outward: weight of facing away from the surface, relative to following the spread of a clump; tip: weight of the
+    distances between tips in the division into clumps, relative to those between roots.
+    """
+
+    outward: float = 2.0
+    tip: float = 1.0
+
+
+@dataclass(frozen=True)
+class CardStrands:
+    """Strands that become cards: points (S, P, 3), radii (S, P), linear colors (S, P, 3); surface: in their space."""
+
+    points: np.ndarray
+    radii: np.ndarray
+    colors: np.ndarray
+    surface: TriMesh
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Cards before their textures are drawn: mesh beside the surface, strands in the texture, number of pictures."""
+
+    mesh: PolygonMesh
+    strands: PlacedStrands
+    picture_count: int
+
+
+@dataclass(frozen=True)
+class _Pieces:
+    """Strands or parts of strands on cards: N pieces for M cards; a strand can have several.
+
+    strands: (N,) index; reaches: (N,) part of its length, from the root; labels: (N,) card; axes: of the cards.
+    """
+
+    strands: np.ndarray
+    reaches: np.ndarray
+    labels: np.ndarray
+    axes: ribbons.Axes
+
+
+def laid_cards(
+    strands: CardStrands,
+    level: Level,
+    settings: CardSettings,
+    placement: Placement,
+    progress: Progress = no_progress,
+) -> Laid:
+    """Return the cards of a level with at most as many cards as strands. Raises `HairError`.
+
+    settings: number of pictures, and parts of the cards that are crossed, flyaways or caps.
+    """
+    pieces = _pieces(strands.points, strands.surface, level, settings, placement, progress)
+    progress("Making cards", 1.0)
+    shown = [_cut(values[pieces.strands], pieces.reaches) for values in _of_points(strands)]
+    lines, widths, shades = shown[0], shown[1][..., 0], shown[2]
+    labels, count = pieces.labels, level.card_count
+    flat = ribbons.flattened(lines, labels, pieces.axes)
+    found = outlines.outlines(flat, widths, labels, pieces.axes)
+    lifted = outlines.heights(flat, labels, found)
+    flat = outlines.levelled(flat, labels, found, lifted)
+    sizes = np.bincount(labels, minlength=count)
+    places = atlas.atlas(found, sizes, settings.picture_count, level.texture_size)
+    chosen, flat_lines, flat_radii = places.placed(flat, widths, labels, found.boxes)
+    heights = float(flat_lines[..., 2].min()), float(flat_lines[..., 2].max())
+    ids = np.random.default_rng(0).permutation(len(chosen)) / max(len(chosen) - 1, 1)
+    reaches = pieces.reaches[chosen].astype(np.float32)
+    placed = PlacedStrands(flat_lines, flat_radii, shades[chosen], ids.astype(np.float32), heights, reaches)
+    return Laid(outlines.ribbon_mesh(pieces.axes, found, places.uvs(found), lifted), placed, len(places.shown))
+
+
+def _of_points(strands):
+    """Return points, radii and colors (S, P, k)."""
+    return strands.points, strands.radii[..., None], strands.colors
+
+
+def _pieces(points, surface, level, settings, placement, progress):
+    """Return the `_Pieces` of strands on clumps, crossed cards, flyaways and cards on the surface, in this order."""
+    crossed, flyaways, caps = settings.parts_of(level.card_count)
+    clump_count = level.card_count - crossed - flyaways - caps
+    features = clusters.strand_features(points)
+    features[:, 3:] *= np.linspace(1.0, placement.tip, 4)[1:].repeat(3).astype(np.float32)
+    everywhere = np.arange(len(points))
+    loose = _outermost(points, features, clump_count, flyaways) if flyaways else everywhere[:0]
+    inner = np.setdiff1d(everywhere, loose)
+    labels = clusters.clusters(features[inner], clump_count, progress)
+    axes = ribbons.axes_of(points[inner], labels, clump_count, level.segment_count, surface, placement.outward)
+    parts = [(inner, labels, axes, 1.0)]
+    if crossed:
+        parts.append(_second(points, parts[0], crossed))
+    if flyaways:
+        parts.append(_ribbons(points, loose, np.arange(flyaways), level, surface, 1.0))
+    if caps:
+        roots = _cut(points, np.full(len(points), _CAP_REACH))
+        of_caps = clusters.clusters(clusters.strand_features(roots), caps)
+        parts.append(_ribbons(roots, everywhere, of_caps, level, surface, _CAP_REACH))
+    firsts = np.cumsum([0] + [len(part[2].centres) for part in parts])
+    return _Pieces(
+        np.concatenate([part[0] for part in parts]),
+        np.concatenate([np.full(len(part[0]), part[3]) for part in parts]),
+        np.concatenate([part[1] + first for part, first in zip(parts, firsts, strict=False)]),
+        ribbons.joined([part[2] for part in parts]),
+    )
+
+
+def _ribbons(lines, strands, labels, level, surface, reach):
+    """Return (strands, labels, axes, reach) of cards for parts of strands; lines: of all strands."""
+    count = int(labels.max()) + 1
+    return strands, labels, ribbons.axes_of(lines[strands], labels, count, level.segment_count, surface), reach
+
+
+def _outermost(points, features, clump_count, count):
+    """Return indices (count,), ascending, of the strands farthest from the middle of the other strands near them."""
+    labels = clusters.clusters(features, clump_count)
+    middles, sizes = clusters.cluster_means(points, labels, clump_count), np.bincount(labels)
+    away = np.linalg.norm(points - middles[labels], axis=-1).mean(axis=1)
+    away *= sizes[labels] / np.maximum(sizes[labels] - 1, 1)  # the middle without the strand itself
+    for strand in np.flatnonzero(sizes[labels] == 1) if clump_count > 1 else ():
+        others = np.delete(middles, labels[strand], axis=0)
+        away[strand] = np.linalg.norm(points[strand] - others, axis=-1).mean(axis=1).min()
+    return np.sort(np.argsort(-away, kind="stable")[:count])
+
+
+def _second(points, part, count):
+    """Return (strands, labels, axes, reach) of cards at a right angle to the cards of the thickest clumps."""
+    strands, labels, axes, reach = part
+    flat = ribbons.flattened(points[strands], labels, axes).astype(np.float64)
+    thickness = clusters.cluster_means((flat[..., 2] ** 2).mean(axis=1), labels, len(axes.centres))
+    crossed = np.argsort(-thickness, kind="stable")[:count]
+    card = np.full(len(axes.centres), -1)
+    card[crossed] = np.arange(count)
+    members = np.flatnonzero(card[labels] >= 0)
+    turned = axes.chosen(crossed).turned(np.full(count, 0.5 * np.pi))
+    return strands[members], card[labels[members]], turned, reach
+
+
+def _cut(values, reaches):
+    """Return values (N, P, k) of points resampled to P points along the first parts (N,) of the strands."""
+    if (reaches == 1.0).all():
+        return values
+    last = values.shape[1] - 1
+    at = np.linspace(0.0, last, last + 1) * np.asarray(reaches)[:, None]
+    low = np.minimum(at.astype(int), last - 1)
+    part = (at - low)[..., None].astype(values.dtype)
+    rows = np.arange(len(values))[:, None]
+    return values[rows, low] * (1.0 - part) + values[rows, low + 1] * part
+
+
+def texture_segments(strands: PlacedStrands, size: int, per_side: int) -> np.ndarray:
+    """Return the segment that each sample (size · per_side, size · per_side) of a texture shows, or `NO_STRAND`.
+
+    A segment has the index strand · (P - 1) + piece; the highest strand is visible.
+    """
+    side = size * per_side
+    low, high = strands.heights
+    places = strands.places.astype(np.float64)
+    places[..., 2] = (high - places[..., 2]) / max(high - low, 1e-12) / side
+    flat = places * [1.0, 1.0, 0.0]
+    edges = np.diff(flat, axis=1)
+    across = np.stack([-edges[..., 1], edges[..., 0], np.zeros(edges.shape[:2])], axis=-1)
+    across /= np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-18)
+    here, there = (radii[..., None] * across for radii in (strands.radii[:, :-1], strands.radii[:, 1:]))
+    first, second = places[:, :-1], places[:, 1:]
+    quads = np.stack([first - here, first + here, second + there, second - there], axis=2) * side
+    samples = Samples(side)
+    samples.add(quads[:, :, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3))
+    seen = samples.triangles()
+    return np.where(seen == NONE, NO_STRAND, seen // 2)
