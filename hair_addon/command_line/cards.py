@@ -35,7 +35,9 @@ def run(given, console):
 def _cards(given, console, hair, settings):
     """Make the cards; returns ([object], {name: count} of the finest level, notes)."""
     folder = given.textures
-    if folder is None and not blender.io.mesh_export.has_textures(given.out):
+    # Exporters embed only the textures that the material uses.
+    is_packed = settings.texture_layout != "SEPARATE"
+    if folder is None and (is_packed or not blender.io.mesh_export.has_textures(given.out)):
         folder = given.out.parent
     levels = run_now(blender.io.hair_cards.making_cards(hair, settings, folder), console.progress)
     counts = {"cards": levels[0].card_count, "pictures": levels[0].picture_count, "levels": len(levels)}

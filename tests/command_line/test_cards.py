@@ -52,6 +52,13 @@ def test_textures_lie_beside_files_that_have_none(shot):
     assert {"cards.obj", "Hair_Cards_LOD0_color.png"} <= names and len(names) == 7
 
 
+def test_textures_of_engines_lie_beside_files_that_embed_others(shot):
+    words = ("--cards", "10", "--texture-size", "128", "--texture-layout", "UNREAL")
+    assert run_here("cards", shot, "--out", "//out/cards.glb", *words).status == 0
+    names = {path.name for path in (shot.parent / "out").iterdir()}
+    assert {"cards.glb", "Hair_Cards_LOD0_unreal_Attributes.png", "Hair_Cards_LOD0_unreal_Material.png"} <= names
+
+
 def test_relative_paths_lead_to_all_levels_and_their_textures(shot, monkeypatch):
     """Paths relative to the .blend lead to all levels and textures; USD names textures relative to its own folder."""
     bpy.utils.expose_bundled_modules()

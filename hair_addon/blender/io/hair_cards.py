@@ -14,6 +14,7 @@ from ...core.errors import HairError
 from ...core.files import file_names
 from ...core.files.atomic_file import require_writable_path
 from ...core.long_work import Stage, part_of
+from ...core.shading import appearance
 from ..data import whole_changes
 from ..data.made import card_images, made_meshes
 from ..materials import card_material
@@ -72,7 +73,7 @@ def making_cards(hair, settings, folder=None):
     for index, level in enumerate(levels):
         drawn.append((yield from _drawing(strands, comparison, level, settings, parts[index : index + 2])))
     joints = yield lambda _progress: read.joints(settings)
-    return _written(read, drawn, joints, folder)
+    return _written(read, drawn, joints, folder, settings.texture_layout)
 
 
 def _drawing(strands, comparison, level, settings, parts):
@@ -117,10 +118,13 @@ def _stem(name, taken):
     )
 
 
-def _written(read, drawn, joints, folder):
+def _written(read, drawn, joints, folder, layout):
     name = f"{read.name} Cards"
     stem = "" if folder is None else _stem(read.name, card_images.files_of_others(f"{name} LOD", folder))
-    images = [card_images.new_images(f"{name} LOD{index}", level.maps) for index, level in enumerate(drawn)]
+    roughness = appearance.shaded(read.look).roughness
+    images = [
+        card_images.new_images(f"{name} LOD{index}", level.maps, layout, roughness) for index, level in enumerate(drawn)
+    ]
     pieces, made = hair_meshes.Pieces(read, name, joints), []
     for index, (level, its) in enumerate(zip(drawn, images, strict=True)):
         title = f"{name} LOD{index}"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         ribbons,
         spring_colliders,
         texels,
+        texture_layouts,
         tubes,
     )
 else:

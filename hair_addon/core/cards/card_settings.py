@@ -89,6 +89,16 @@ class CardSettings(Settings):
     texture_size: int = param(
         2048, "Width and height of the textures in pixels; a power of two suits most engines", low=128, high=8192
     )
+    texture_layout: str = param(
+        "SEPARATE",
+        "Textures for game engines, beside those of the material",
+        label="Texture Layout",
+        choices=(
+            ("SEPARATE", "Separate", "One texture for each value"),
+            ("UNREAL", "Unreal, Default", "Add five textures in Unreal's layout Card Default"),
+            ("UNREAL_COMPACT", "Unreal, Compact", "Add three textures in Unreal's layout Card Compact"),
+        ),
+    )
     chain_count: int = param(
         0,
         "Chains of bones that swing the hair in game engines. Zero adds no bones: pieces follow the surface's armature",

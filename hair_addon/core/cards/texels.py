@@ -31,7 +31,7 @@ class TexelSums:
     def __init__(self, size: int) -> None:
         self.size, self._sample_count = size, 0
         self._covered = np.zeros(size * size)
-        self._sums = np.zeros((9, size * size), np.float32)
+        self._sums = np.zeros((12, size * size), np.float32)
 
     def add(self, segments: np.ndarray, strands: PlacedStrands, per_side: int, shift: np.ndarray, rows: range) -> None:
         """Add a pass of per_side² samples per texel, for some rows of texels.
@@ -54,21 +54,22 @@ class TexelSums:
             sums += np.bincount(texels, weights=value, minlength=len(self._covered))
 
     def maps(self) -> dict[str, np.ndarray]:
-        """Return {map: (size, size) or (size, size, 3) float32} of `MAPS`, from 0 to 1, bottom row first.
+        """Return {map: (size, size) or (size, size, 3) float32} of `MAPS` and "tangent", from 0 to 1.
 
-        Colors are linear RGB; normals are in tangent space, mapped from [-1, 1]. Texels without strands are filled from
-        their surroundings.
+        The bottom row is the first one. Colors are linear RGB; normals, and tangents from root to tip, are in tangent
+        space, mapped from [-1, 1]. Texels without strands are filled from their surroundings.
         """
         side = self.size, self.size
         alpha = (self._covered / self._sample_count).reshape(side).astype(np.float32)
-        means = _filled(self._sums.T.reshape(*side, 9), self._covered.reshape(side).astype(np.float32))
-        normals = means[..., 3:6] / np.maximum(np.linalg.norm(means[..., 3:6], axis=-1, keepdims=True), 1e-12)
+        means = _filled(self._sums.T.reshape(*side, 12), self._covered.reshape(side).astype(np.float32))
+        normals, tangents = _unit(means[..., 3:6]), _unit(means[..., 9:])
         shades = {name: means[..., 6 + index].clip(0.0, 1.0) for index, name in enumerate(("depth", "root", "id"))}
-        return {"color": means[..., :3], "alpha": alpha, "normal": 0.5 * normals + 0.5, **shades}
+        directions = {"normal": 0.5 * normals + 0.5, "tangent": 0.5 * tangents + 0.5}
+        return {"color": means[..., :3], "alpha": alpha, **directions, **shades}
 
 
 def _sampled(strands, segments, centres, texel):
-    """Return (9, N) color, normal, depth, fraction from root to tip and ID of samples at centers (N, 2).
+    """Return (12, N) color, normal, depth, fraction from root to tip, ID and tangent of samples at centers (N, 2).
 
     texel: width of a texel. Thinner strands are shaded as flat, because both sides fall into one texel.
     """
@@ -91,12 +92,17 @@ def _sampled(strands, segments, centres, texel):
     along = (piece + part) / pieces
     if strands.reaches is not None:
         along = along * strands.reaches[strand]
-    return np.stack([*colors.T, *normals.T, depth, along, strands.ids[strand]])
+    return np.stack([*colors.T, *normals.T, depth, along, strands.ids[strand], *_unit(edge).T])
+
+
+def _unit(vectors):
+    """Return normalized vectors (..., 3); vectors of zero length stay."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def _normals(edges, across):
     """Return unit normals (N, 3) of fibers seen from above; across: (N,) positions across their width in [-1, 1]."""
-    tangents = edges / np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
+    tangents = _unit(edges)
     facing = np.array([0.0, 0.0, 1.0]) - tangents[:, 2:] * tangents
     length = np.linalg.norm(facing, axis=1, keepdims=True)
     facing = np.where(length > 1e-6, facing / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))

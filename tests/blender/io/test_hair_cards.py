@@ -11,6 +11,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.io import hair_cards
 from hair_addon.blender.render import card_pictures
+from hair_addon.blender.settings import properties
 from hair_addon.core.cards import best_placement, texels
 from hair_addon.core.cards.card_settings import CardSettings
 from hair_addon.core.errors import HairError
@@ -230,3 +231,24 @@ def test_crossed_cards_flyaways_and_caps_are_part_of_the_cards(hair):
     settings = {"card_count": 20, "segment_count": 2, "texture_size": SIZE}
     made = api.make_hair_cards(hair, **settings, crossed=0.5, flyaways=0.2, caps=0.2)
     assert len(made[0].data.polygons) == 40 and not made[0].data.validate()
+
+
+def test_files_of_unreals_layouts_have_the_values_of_the_separate_textures(hair, tmp_path):
+    """Files of packed textures, read again, have the bytes of separate textures in their channels."""
+    settings = {"card_count": 6, "segment_count": 2, "texture_size": 128, "texture_layout": "UNREAL_COMPACT"}
+    api.make_hair_cards(hair, **settings, folder=tmp_path)
+
+    def read(kind):
+        image = bpy.data.images.load(str(tmp_path / f"Hair_Cards_LOD0_{kind}.png"))
+        image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+        return pixels(image)
+
+    assert len([*tmp_path.iterdir()]) == len(texels.MAPS) + 3
+    coverage, depth = read("unreal_CoverageDepthSeed"), read("depth")
+    for channel, kind in enumerate(("alpha", "depth", "id")):
+        np.testing.assert_array_equal(coverage[..., channel], read(kind)[..., 0])
+    assert np.ptp(depth[..., 0]) > 0.5
+    np.testing.assert_array_equal(read("unreal_TangentCoordU")[..., 3], read("root")[..., 0])
+    rough = read("unreal_ColorRoughness")
+    np.testing.assert_array_equal(rough[..., :3], read("color")[..., :3])
+    np.testing.assert_allclose(rough[..., 3], properties.look_of(hair.data.vellus).roughness, atol=1 / 255)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Card textures have the color, normal, depth and other values of samples, and empty texels those of neighbors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import texels
+from hair_addon.core.cards import texels, texture_layouts
 from hair_addon.core.cards.texels import NO_STRAND, PlacedStrands, TexelSums
 
 SIZE = 32
@@ -66,3 +68,41 @@ def test_empty_texels_are_as_what_is_near(strip):
 def test_display_values_are_those_of_srgb():
     np.testing.assert_allclose(texels.srgb(np.array([0.0, 0.18, 1.0, 2.0])), [0.0, 0.46135613, 1.0, 1.0], atol=1e-6)
     np.testing.assert_allclose(texels.srgb(np.array([0.0031307, 0.0031309])), 0.04045, atol=1e-4)
+
+
+def test_tangents_point_from_root_to_tip(strip):
+    """A strand that rises by 45° along V has the tangent (0, √½, √½), and the opposite one if it runs downward."""
+    found = 2.0 * maps(strip, seen(strip))["tangent"] - 1.0
+    np.testing.assert_allclose(found[:, SIZE // 2], np.broadcast_to([0.0, 0.5**0.5, 0.5**0.5], (SIZE, 3)), atol=1e-5)
+    backward = replace(strip, places=strip.places[:, ::-1])
+    segments = seen(strip)
+    other = np.where(segments == NO_STRAND, NO_STRAND, 1 - segments)
+    np.testing.assert_allclose(2.0 * maps(backward, other)["tangent"] - 1.0, -found, atol=1e-5)
+
+
+def test_packed_textures_have_their_values_in_unreals_channels(rng):
+    """Each channel has the value that Unreal's list names; colors are in sRGB, other values unchanged."""
+    parts = {name: rng.random((4, 4)).astype(np.float32) for name in ("alpha", "depth", "root", "id")}
+    parts |= {name: rng.random((4, 4, 3)).astype(np.float32) for name in ("color", "normal", "tangent")}
+    zero, rough = np.zeros((4, 4)), np.full((4, 4), 0.3)
+    color = texels.srgb(parts["color"])
+    wanted = {
+        "UNREAL": {
+            "Depth": [parts["depth"]],
+            "Coverage": [parts["alpha"]],
+            "Tangent": [parts["tangent"]],
+            "Attributes": [zero, parts["root"], parts["id"]],
+            "Material": [color, rough],
+        },
+        "UNREAL_COMPACT": {
+            "TangentCoordU": [parts["tangent"], parts["root"]],
+            "CoverageDepthSeed": [parts["alpha"], parts["depth"], parts["id"]],
+            "ColorRoughness": [color, rough],
+        },
+        "SEPARATE": {},
+    }
+    for layout, textures in wanted.items():
+        found = texture_layouts.packed(parts, layout, 0.3)
+        assert set(found) == {f"unreal_{name}" for name in textures}
+        for name, channels in textures.items():
+            np.testing.assert_allclose(found[f"unreal_{name}"], np.dstack(channels), atol=1e-7)

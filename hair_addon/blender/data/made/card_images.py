@@ -6,17 +6,19 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ....core.cards import texels
+from ....core.cards import texels, texture_layouts
 from ....core.files.atomic_file import atomic_files
 from ...host.notices import name_of
 
 
-def new_images(name, maps):
-    """Return {map: image} of `texels.maps`, neither packed nor saved; "color" includes alpha. name: prefix of image
-    names.
+def new_images(name, maps, layout, roughness):
+    """Return {map: image} of `texels.maps` and of a layout, neither packed nor saved; "color" includes alpha.
+
+    name: prefix of image names; layout: of `CardSettings`; roughness: of the look.
     """
     pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
     pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
+    pixels |= texture_layouts.packed(maps, layout, roughness)
     return {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
 
 
@@ -41,15 +43,15 @@ def files_of_others(name, folder):
 
 
 def _new_image(name, kind, values):
-    """Return a new image with 8 bits per channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
-    size = len(values)
-    image = bpy.data.images.new(name, size, size, alpha=kind == "color")
+    """Return a new image with 8 bits per channel of (n, n) or (n, n, k) values from 0 to 1, with k = 1, 3 or 4."""
+    values, size = values.reshape(*values.shape[:2], -1), len(values)
+    image = bpy.data.images.new(name, size, size, alpha=values.shape[2] == 4)
     image.file_format = "PNG"
     image.alpha_mode = "CHANNEL_PACKED"  # colors continue beyond the edges of strands
-    if kind != "color":
+    if not texture_layouts.has_color(kind):
         image.colorspace_settings.name = "Non-Color"
     rgba = np.ones((size, size, 4), np.float32)
-    rgba[..., : values.shape[2] if values.ndim == 3 else 3] = values if values.ndim == 3 else values[..., None]
+    rgba[..., : max(values.shape[2], 3)] = values
     image.pixels.foreach_set(rgba.ravel())
     return image
 
