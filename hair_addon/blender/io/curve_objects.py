@@ -17,13 +17,17 @@ def new_object(name, placed, surface_object, guide_ids=None, groups=None):
     guide_ids: (G,) IDs of the guides that the curves follow; their indices are stored with the weights; groups: (C,)
     IDs of groups, None for none.
     """
-    matrix = _without_shear(surface_object.matrix_world)
-    to_world = np.array(matrix, np.float64) * strand_arrays.meters_per_unit(bpy.context.scene)
+    datablock = bpy.data.hair_curves.new(name)
+    made = bpy.data.objects.new(name, datablock)
+    bpy.context.scene.collection.objects.link(made)
+    made.matrix_world = _without_shear(surface_object.matrix_world)
+    bpy.context.view_layer.update()
+    # Blender rounds the transform, by up to 3e-5 of it.
+    to_world = np.array(made.matrix_world, np.float64) * strand_arrays.meters_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
     back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
     with np.errstate(over="ignore", invalid="ignore"):
         points = (placed.points.astype(np.float64) @ back[:3, :3].T + back[:3, 3]).astype(np.float32)
-    datablock = bpy.data.hair_curves.new(name)
     datablock.add_curves(np.asarray(placed.counts).tolist())
     datablock.set_types(type="POLY")
     if placed.is_smooth.any():
@@ -42,9 +46,6 @@ def new_object(name, placed, surface_object, guide_ids=None, groups=None):
         attributes.write(datablock, "groom_group_id", "INT", "CURVE", groups)
     if guide_ids is not None and placed.guide_ids is not None:
         curves.write_guide_map(datablock, _guide_map(guide_ids, placed.guide_ids, placed.guide_weights))
-    made = bpy.data.objects.new(name, datablock)
-    bpy.context.scene.collection.objects.link(made)
-    made.matrix_world = matrix
     bpy.context.view_layer.update()
     return made
 

@@ -133,6 +133,34 @@ def test_written_strands_come_back(hair, tmp_path, ending):
     assert ending not in (".ply", ".npz") or len(made["GUIDES"].data.curves) == len(guides)
 
 
+@pytest.mark.parametrize("ending", [".usdc", ".abc"])
+@pytest.mark.parametrize("place", ["uneven", "mirrored and uneven", "on a sheared rig"])
+def test_exported_grooms_come_back_to_a_micrometer(scene, sphere, tmp_path, place, ending):
+    """Hair and guides of an exported groom, imported onto the same surface, are off by less than a micrometer."""
+    put(sphere, **PLACES["uneven"])
+    if place == "mirrored and uneven":
+        sphere.scale.x *= -1.0
+    if place == "on a sheared rig":
+        sphere.parent = bpy.data.objects.new("Rig", None)
+        scene.collection.objects.link(sphere.parent)
+        sphere.parent.scale, sphere.parent.rotation_euler = (1.0, 2.0, 0.5), (0.2, 0.1, 0.7)
+        sphere.scale, sphere.rotation_euler = (1.0, 1.5, 0.7), (0.3, 0.5, 0.2)
+    update()
+    select(sphere)
+    bpy.ops.vellus.add_hair(guide_count=20, strand_count=50, length=0.1)
+    update()
+    before = set(bpy.data.objects)
+    wanted = {one.data.vellus.kind: world(one) for one in before if one.type == "CURVES"}
+    api.export_groom(tmp_path / f"a{ending}")
+    select(sphere)
+    assert bpy.ops.vellus.import_groom(filepath=str(tmp_path / f"a{ending}")) == {"FINISHED"}
+    update()
+    made = {one.data.vellus.kind: world(one) for one in set(bpy.data.objects) - before}
+    assert set(made) == set(wanted) == {"HAIR", "GUIDES"}
+    for kind, points in wanted.items():
+        np.testing.assert_allclose(made[kind], points, rtol=0.0, atol=1e-6)
+
+
 def test_a_format_of_one_frame_refuses_animation(hair, tmp_path):
     with pytest.raises(HairError, match="one frame"):
         api.export_groom(tmp_path / "a.hair", [hair], animation="ALL")
