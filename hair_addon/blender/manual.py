@@ -28,7 +28,7 @@ _CLASSES = {
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading"}
 _PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
-_PROPERTIES |= {"thickness_ramp": "shading"}
+_PROPERTIES |= {"thickness_ramp": "shading", "is_reduced_in_viewport": "shading"}
 _PROPERTIES |= {"show_guides": "systems", "guide_colors": "systems", "guide_opacity": "systems"}
 _PROPERTIES |= {"shows_styles_while_combing": "surface", "keeps_outside": "surface", "style": "styles"}
 

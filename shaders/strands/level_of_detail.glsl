@@ -18,3 +18,10 @@ int drawn_strand(int turn)
   }
   return (turn - round * parts) * view.part_size + (round * view.part_stride) % view.part_size;
 }
+
+// Factor of the length by which the ends of a strand extend it in a picture: a strand that represents others is thicker,
+// but no longer, than each of them. 1 in shadow maps.
+float end_share()
+{
+  return (view.sample_offset > 0.0) ? float(view.drawn_strands) / float(view.strand_count) : 1.0;
+}

@@ -40,7 +40,7 @@ void main()
   if (drawn_point == 0 || drawn_point == view.drawn_points - 1) {
     // A strand ends in half a disk: the strip is extended by a rectangle of the same area.
     float beyond = (drawn_point == 0) ? -FOURTH_OF_PI : FOURTH_OF_PI;
-    offset += cross(normalize(to_view), beside) * (beyond * true_half_width);
+    offset += cross(normalize(to_view), beside) * (beyond * end_share() * true_half_width);
   }
   gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);
 }

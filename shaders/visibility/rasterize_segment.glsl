@@ -162,7 +162,7 @@ void walk_to_ends(Segment segment, bvec2 are_ends, ivec2 size)
 {
   vec2 beyond_ends = vec2(0.0);
   if (are_ends.x || are_ends.y) {
-    beyond_ends = end_lengths(segment) * vec2(are_ends);
+    beyond_ends = end_lengths(segment) * end_share() * vec2(are_ends);
     bvec2 are_wide = greaterThanEqual(segment.half_width, vec2(IS_ROUND ? LEAST_BEND : 1e9));
     beyond_ends *= vec2(not(are_wide));
     if (are_ends.x && are_wide.x) {

@@ -6,25 +6,45 @@ changes one by one with the distance, without popping. Each pass of a picture us
 contribute to a still view.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from . import drawing
 
-# Maximum width [samples] of strands that represent others; distance [samples] between two points.
-_FULL_WIDTH = 0.5
+# Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands on
+# the outline of small hair would cover more samples than all strands. Distance [samples] between two points.
+_FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 200.0
 _PIECE_LENGTH = 2.0
 
-_LEAST_STRANDS, _LEAST_POINTS = 10_000, 9
+_LEAST_STRANDS, _LEAST_POINTS = 2000, 9
 
 
-def steps_of(strands, view, object_to_world, part=1.0):
+@dataclass(frozen=True)
+class Limits:
+    """An artist's limits of the level of detail of a hair in viewports.
+
+    part: maximum fraction of all strands; is_reduced: whether distant hair is reduced.
+    """
+
+    part: float = 1.0
+    is_reduced: bool = True
+
+
+NO_LIMITS = Limits()
+
+
+def steps_of(strands, view, object_to_world, limits=NO_LIMITS):
     """Return the `drawing.Steps` that suffice for `StrandsOnGPU` in a view.
 
-    view: a `uniforms.VIEW` record; object_to_world: (4, 4); part: maximum fraction of all strands.
+    view: a `uniforms.VIEW` record; object_to_world: (4, 4); limits: `Limits`.
     """
-    count = strands.strand_count
-    samples_per_meter = _closest(strands, view, object_to_world) * drawing.scale_of(object_to_world)
-    wanted = 2.0 * strands.mean_radius * samples_per_meter / _FULL_WIDTH
+    count, part = strands.strand_count, limits.part
+    if not limits.is_reduced:
+        return drawing.Steps(None, max(int(count * part), 1))
+    samples_per_unit, diameter = _size_in(view, strands, object_to_world)
+    samples_per_meter = samples_per_unit * drawing.scale_of(object_to_world)
+    wanted = 2.0 * strands.mean_radius * samples_per_meter / min(_FULL_WIDTH, _WIDTH_PART * diameter)
     strand_count = int(np.clip(count * min(wanted, part), min(_LEAST_STRANDS, count * part), count))
     pieces = strands.mean_length * samples_per_meter / _PIECE_LENGTH
     point_count = int(np.clip(np.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS, strands.point_count))
@@ -33,11 +53,11 @@ def steps_of(strands, view, object_to_world, part=1.0):
     return drawing.Steps(point_count, max(strand_count, 1), int(turn * count))
 
 
-def _closest(strands, view, object_to_world):
-    """Samples per meter at the nearest hair; infinite if the viewer is inside."""
-    pixels_per_unit = float(view["pixels_per_unit"])
-    if not view["is_perspective"]:
-        return pixels_per_unit
+def _size_in(view, strands, object_to_world):
+    """Return samples per unit at the nearest hair, and its diameter [samples]; infinite if the viewer is inside."""
     centre, radius = drawing.bounding_sphere([(strands, object_to_world)])
-    distance = float(np.linalg.norm(view["eye"][:3] - centre)) - radius
-    return pixels_per_unit / distance if distance > 0.0 else np.inf
+    samples_per_unit = float(view["pixels_per_unit"])
+    if view["is_perspective"]:
+        distance = float(np.linalg.norm(view["eye"][:3] - centre)) - radius
+        samples_per_unit = samples_per_unit / distance if distance > 0.0 else np.inf
+    return samples_per_unit, 2.0 * radius * samples_per_unit

@@ -10,7 +10,16 @@ from ...core.errors import HairError
 from ...core.long_work import no_progress, part_of
 from ..data.pictures import drawn_meshes, viewport_shading
 from ..data.pictures.mist import WITHOUT_WORLD, Mist, read_mist
-from ..gpu import ambient_visibility, drawing, scene_lights, strand_textures, studio_lights, surface_textures, windows
+from ..gpu import (
+    ambient_visibility,
+    drawing,
+    level_of_detail,
+    scene_lights,
+    strand_textures,
+    studio_lights,
+    surface_textures,
+    windows,
+)
 from ..gpu import lights as blender_lights
 from ..gpu.programs import uniforms
 from ..gpu.shadows import ShadowMaps
@@ -27,7 +36,7 @@ _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
 class DrawnScene:
     """A scene on the GPU: read once by `read`, and drawn from any number of views until something moves."""
 
-    hair: list  # (StrandsOnGPU, Shading, object to world, part in viewports)
+    hair: list  # (StrandsOnGPU, Shading, object to world, `level_of_detail.Limits` in viewports)
     surfaces: list  # visible solid surfaces: (SurfaceOnGPU, parts of a `DrawnMesh`, None for a holdout)
     lights: np.ndarray  # uniforms.LIGHTS shared by all receivers
     world: blender_lights.World
@@ -408,7 +417,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
             continue
         uvs = read_strands.read_root_uvs(hair_object.data, read.is_sound) if has_uvs else None
         texture = None if uvs is None else strand_textures.pairs_texture(uvs, strands.row_strands)
-        yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance), texture
+        yield (strands, shading, to_world, level_of_detail.NO_LIMITS), drawn_meshes.owner_of(instance), texture
 
 
 def _read_hair(places, viewport, refused, shown, depsgraph):
@@ -428,8 +437,9 @@ def _read_hair(places, viewport, refused, shown, depsgraph):
             refused(datablock, error)
             continue
         if strands is not None:
-            part = 0.01 * datablock.vellus.viewport_percentage
-            hair.append((strands, shading, place.to_world, part))
+            state = datablock.vellus
+            limits = level_of_detail.Limits(0.01 * state.viewport_percentage, state.is_reduced_in_viewport)
+            hair.append((strands, shading, place.to_world, limits))
             drawn_places.append(place)
     return hair, drawn_places
 

@@ -91,8 +91,8 @@ def _hair_lights(drawn):
 
 def _hair_in_view(drawn, view, is_viewport):
     hair = []
-    for (strands, shading, to_world, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
-        steps = level_of_detail.steps_of(strands, view, to_world, part) if is_viewport else drawing.Steps()
+    for (strands, shading, to_world, limits), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
+        steps = level_of_detail.steps_of(strands, view, to_world, limits) if is_viewport else drawing.Steps()
         if drawn.is_wire:
             steps = replace(steps, thickness=_WIRE_THICKNESS)
         hair.append((strands, shading, to_world, drawn.shadow_maps.samplers | seen, steps))

@@ -226,6 +226,12 @@ class VellusCurves(bpy.types.PropertyGroup):
         max=100,
         default=100,
     )
+    is_reduced_in_viewport: bpy.props.BoolProperty(
+        name="Reduce Distant Hair",
+        description="Show distant hair in viewports with fewer, thicker strands; renders are unchanged",
+        translation_context=CONTEXT,
+        default=True,
+    )
     show_guides: bpy.props.BoolProperty(
         name="Show Guides",
         description="Show the guides in viewports while they are not selected; without hair they always are",

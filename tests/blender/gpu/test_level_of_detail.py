@@ -22,10 +22,10 @@ def seen_from(distance, size=SIZE):
     return world_to_view, np.array([[2.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, -1.002, -0.2002], [0, 0, -1, 0]])
 
 
-def steps_from(strands, distance, part=1.0, coverage_turn=0.0):
+def steps_from(strands, distance, part=1.0, coverage_turn=0.0, is_reduced=True):
     view = drawing.view_record(*seen_from(distance), SIZE, least_width=1.0)
     view["coverage_turn"] = coverage_turn
-    return level_of_detail.steps_of(strands, view, np.eye(4), part)
+    return level_of_detail.steps_of(strands, view, np.eye(4), level_of_detail.Limits(part, is_reduced))
 
 
 @pytest.fixture
@@ -42,9 +42,32 @@ def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
     counts, points = (np.array([getattr(one, name) for one in steps]) for name in ("strand_count", "point_count"))
     assert (counts[0], points[0]) == (50_000, 41)
     assert (np.diff(counts) <= 0).all() and (np.diff(points) <= 0).all()
-    assert (counts[-1], points[-1]) == (10_000, 9)
-    falling = counts[:-1] > 10_000
-    assert (counts[1:][falling] > 0.9 * counts[:-1][falling]).all()  # a step of the distance is 1.3 %
+    assert counts[-1] == counts[-50] < 20_000 and points[-1] == 9
+    assert (counts[1:] > 0.9 * counts[:-1]).all()  # a step of the distance is 1.3 %
+
+
+def test_the_level_of_detail_has_no_scale(many):
+    """Hair in another unit, seen from as many of its diameters, has as many strands and points."""
+    view = drawing.view_record(*seen_from(8.0), SIZE)
+    steps = level_of_detail.steps_of(many, view, np.eye(4))
+    assert steps.strand_count < 50_000 and steps.point_count < 41
+    for scale in (0.01, 100.0):
+        view = drawing.view_record(*seen_from(8.0 * scale), SIZE)
+        same = level_of_detail.steps_of(many, view, np.diag([scale, -scale, scale, 1.0]))
+        assert abs(same.strand_count - steps.strand_count) <= 1 and same.point_count == steps.point_count
+
+
+def test_all_strands_and_points_are_drawn_if_the_artist_asks_for_them(many):
+    whole, half = (steps_from(many, 300.0, part, is_reduced=False) for part in (1.0, 0.5))
+    assert drawing.strand_record(many, uniforms.VIEW.record(), np.eye(4), whole)["drawn_points"] == 41
+    assert (whole.strand_count, half.strand_count) == (50_000, 25_000)
+
+
+def test_near_hair_is_not_reduced(many):
+    """Near hair is drawn by the same numbers, so to the same bits, whether distant hair is reduced or not."""
+    near, whole = (steps_from(many, 1.5, is_reduced=is_reduced) for is_reduced in (True, False))
+    one, other = (drawing.strand_record(many, uniforms.VIEW.record(), np.eye(4), steps) for steps in (near, whole))
+    assert one.tobytes() == other.tobytes()
 
 
 def drawn_strands(strand_count, steps):
@@ -115,3 +138,54 @@ def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     assert steps.strand_count < strands.strand_count
     monkeypatch.setattr(level_of_detail, "steps_of", lambda *_args: drawing.Steps())
     np.testing.assert_allclose(some, picture(), rtol=0.06)
+
+
+CROWD = (208, 64)  # size of a picture of several heads [pixels]
+FOCUS = 96.0  # of its camera [pixels]
+
+
+def crowd_beside(hair, distances):
+    """Link head and hair at distances from a camera at the origin, side by side; returns the columns of each."""
+    head, column, columns = hair.parent, 0.0, []
+    for distance in distances:
+        width = 3.4 * FOCUS / distance
+        place = ((column + 0.5 * width - 0.5 * CROWD[0]) / FOCUS * distance, distance, 0.0)
+        others = [one.copy() for one in (head, hair)]
+        others[0].location, others[1].parent = place, others[0]
+        for one in others:
+            bpy.context.scene.collection.objects.link(one)
+        columns.append(slice(int(column), int(column + width)))
+        column += width
+    assert column < CROWD[0]
+    head.hide_viewport = head.hide_render = True
+    bpy.data.objects.remove(hair)
+    bpy.context.view_layer.update()
+    return columns
+
+
+def heads_in(columns):
+    """Return (H, 4) means of a crowd's heads over the square around each: color in display units, and coverage."""
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+    assert len(drawn.hair) == len(columns) and len({id(strands) for strands, *_ in drawn.hair}) == 1
+    world_to_view, view_to_clip = seen_from(0.0)
+    view_to_clip[[0, 1], [0, 1]] = 2.0 * FOCUS / np.array(CROWD)
+    found = hair_picture.HairPicture(CROWD, 2)
+    while not found.is_fine:
+        found.add_pass(drawn, world_to_view, view_to_clip)
+    means = []
+    for part in columns:
+        head, side = found.read()[:, part].sum(axis=(0, 1)), 3.0 / 3.4 * (part.stop - part.start)
+        means.append([*(1.055 * (head[:3] / head[3]) ** (1.0 / 2.4) - 0.055), head[3] / side**2])
+    return np.array(means)
+
+
+def test_each_head_of_a_crowd_is_as_bright_and_covers_as_much_as_with_all_strands(thin):
+    """At eight distances, mean color and coverage of linked heads are within 2 / 255 of those of all strands."""
+    thin.data.vellus.hair.strand_count, thin.data.vellus.hair.radius = 6000, 0.0026
+    bpy.context.view_layer.update()
+    state = thin.data.vellus
+    columns = crowd_beside(thin, np.geomspace(7.0, 45.0, 8))
+    some = heads_in(columns)
+    state.is_reduced_in_viewport = False
+    whole = heads_in(columns)
+    np.testing.assert_allclose(some, whole, rtol=0.0, atol=2.0 / 255.0)

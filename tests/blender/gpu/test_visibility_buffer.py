@@ -156,6 +156,19 @@ def test_a_strand_behind_a_surface_is_hidden(shading):
 
 
 @pytest.mark.parametrize("in_compute", [True, False])
+def test_strands_that_represent_others_are_thicker_but_no_longer(rng, shading, in_compute):
+    """Few thick strands cover as many samples as all strands, although their ends are half disks of their own width."""
+    start = np.append(rng.uniform(-0.18, 0.18, (12_000, 1, 2)), np.full((12_000, 1, 1), -2.0), axis=2)
+    along = rng.normal(size=(12_000, 1, 2))
+    along *= 3.0 * 0.4 / SIZE[1] / np.linalg.norm(along, axis=2, keepdims=True)  # three samples
+    points = (start + np.pad(along, ((0, 0), (0, 0), (0, 1))) * np.linspace(0.0, 1.0, 3)[:, None]).astype(np.float32)
+    placed = [(points, np.full((12_000, 3), 0.025 * 0.4 / SIZE[1], np.float32), np.eye(4))]
+    few = drawing.Steps(strand_count=1200)
+    every, some = ((drawn(placed, PARALLEL, shading, in_compute, steps=steps)[0] >= 0).sum() for steps in (ALL, few))
+    assert some == pytest.approx(every, rel=0.05)
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
 def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_compute):
     """Strands a fifth of a sample wide that lie in one line cover together as much as one strand, at any slope."""
     sample = 2.0 * HALF_WIDTH / SIZE[0]

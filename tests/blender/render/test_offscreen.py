@@ -13,6 +13,7 @@ from hair_addon.blender.gpu import (
     ambient_visibility,
     drawing,
     hair_shading,
+    level_of_detail,
     lights,
     shadows,
     strand_textures,
@@ -143,7 +144,7 @@ def test_light_through_curtains_falls_exponentially(scene, sheets):
     placed = [(strands, np.eye(4)) for strands in (*hair, receiver)]
     maps.draw(lights, placed, [])
     seen, _none = ambient_visibility.measure([(receiver, np.eye(4))], [], [shading.opacity], [])
-    drawn = [(receiver, shading, np.eye(4), 1.0)]
+    drawn = [(receiver, shading, np.eye(4), level_of_detail.NO_LIMITS)]
     radiance = seen_from_behind(drawn_scene.DrawnScene(drawn, [], lights, World(np.zeros(3)), maps, seen, []))
     depth = -np.log(radiance / np.array(settings.diffuse_color))
     expected = sheets * coverage * (1.0 - 0.5 * np.array(settings.diffuse_color))

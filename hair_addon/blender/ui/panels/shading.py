@@ -61,7 +61,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         row(layout, state, "is_drawn")
         for note in (*modifier_notes(_hair_object(context)), *world_panoramas.sentences()):
             write(layout, context, note, "INFO")
-        for name in ("viewport_percentage", "model"):
+        for name in ("viewport_percentage", "is_reduced_in_viewport", "model"):
             row(layout, state, name)
         if state.model != "KAJIYA_KAY":
             row(layout, state.appearance, "mode")
