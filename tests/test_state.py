@@ -35,6 +35,7 @@ STATE = {
 # Functions of their arguments alone, and of what the extension was installed with: what they return is never stale.
 PURE = {
     "blender/gpu/drawing.py: _parts",
+    "blender/gpu/surface_textures.py: _row_of",
     "blender/gpu/programs/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
     "blender/host/system_memory.py: _host",

@@ -103,6 +103,15 @@ def bounding_sphere(hair):
     return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
 
 
+def bounding_spheres(hair):
+    """Return (N, 3) centers and (N,) radii [m] of `bounding_sphere` around each hair."""
+    to_world = np.stack([matrix for _strands, matrix in hair])
+    corners = windows.corners_of(np.stack([strands.bounds for strands, _matrix in hair]))
+    corners = corners @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
+    centres = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    return centres, np.maximum(np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1), _LEAST_RADIUS)
+
+
 def tight_sphere(hair):
     """`bounding_sphere` around strands instead of the corners of their boxes; tight for a single hair."""
     centres, radii = [], []

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import gpu
 import numpy as np
@@ -36,7 +36,7 @@ class Shading:
     # For the energy-conserving model: (`lookup_tables.Settings`, `strand_variation.Settings` or None).
     fibre: tuple | None = None
 
-    @property
+    @cached_property
     def opacity(self):
         """Opacity of a strand, averaged over the channels."""
         return _opacity(self.forward)
@@ -74,7 +74,7 @@ class MixedShading:
         """`Shading.reflectance`, averaged over the strands."""
         return (1.0 - self.mean_share) * self.driest.reflectance + self.mean_share * self.wettest.reflectance
 
-    @property
+    @cached_property
     def opacity(self):
         """Opacity of a strand, averaged over the channels and strands."""
         return _opacity(self.forward)

@@ -6,15 +6,16 @@ changes one by one with the distance, without popping. Each pass of a picture us
 contribute to a still view.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import drawing
 
-# Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands on
-# the outline of small hair would cover more samples than all strands. Distance [samples] between two points.
-_FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 200.0
+# Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands would
+# widen the tips of locks and the outline. Distance [samples] between two points.
+_FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
 _PIECE_LENGTH = 2.0
 
 _LEAST_STRANDS, _LEAST_POINTS = 2000, 9
@@ -34,30 +35,41 @@ class Limits:
 NO_LIMITS = Limits()
 
 
-def steps_of(strands, view, object_to_world, limits=NO_LIMITS):
-    """Return the `drawing.Steps` that suffice for `StrandsOnGPU` in a view.
+def steps_of(hair, view):
+    """Return the `drawing.Steps` that suffice for each hair in a view.
 
-    view: a `uniforms.VIEW` record; object_to_world: (4, 4); limits: `Limits`.
+    hair: [(`StrandsOnGPU`, object to world, `Limits`)]; view: a `uniforms.VIEW` record.
     """
+    if not hair:
+        return []
+    sizes = _sizes_in(view, [(strands, to_world) for strands, to_world, _limits in hair])
+    turn = float(view["coverage_turn"]) % 1.0
+    return [_steps(*one, *size, turn) for one, size in zip(hair, sizes, strict=True)]
+
+
+def _steps(strands, to_world, limits, samples_per_unit, diameter, turn):
+    """Return the `drawing.Steps` of a hair; samples_per_unit, diameter: of `_sizes_in`; turn: of the pass."""
     count, part = strands.strand_count, limits.part
     if not limits.is_reduced:
         return drawing.Steps(None, max(int(count * part), 1))
-    samples_per_unit, diameter = _size_in(view, strands, object_to_world)
-    samples_per_meter = samples_per_unit * drawing.scale_of(object_to_world)
+    samples_per_meter = samples_per_unit * drawing.scale_of(to_world)
     wanted = 2.0 * strands.mean_radius * samples_per_meter / min(_FULL_WIDTH, _WIDTH_PART * diameter)
-    strand_count = int(np.clip(count * min(wanted, part), min(_LEAST_STRANDS, count * part), count))
+    strand_count = int(min(max(count * min(wanted, part), min(_LEAST_STRANDS, count * part)), count))
     pieces = strands.mean_length * samples_per_meter / _PIECE_LENGTH
-    point_count = int(np.clip(np.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS, strands.point_count))
+    point_count = min(max(math.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS), strands.point_count)
     # With a limit by the artist each pass draws the same strands.
-    turn = float(view["coverage_turn"]) % 1.0 if part == 1.0 else 0.0
-    return drawing.Steps(point_count, max(strand_count, 1), int(turn * count))
+    first = int(turn * count) if part == 1.0 else 0
+    return drawing.Steps(point_count, max(strand_count, 1), first)
 
 
-def _size_in(view, strands, object_to_world):
-    """Return samples per unit at the nearest hair, and its diameter [samples]; infinite if the viewer is inside."""
-    centre, radius = drawing.bounding_sphere([(strands, object_to_world)])
-    samples_per_unit = float(view["pixels_per_unit"])
+def _sizes_in(view, placed):
+    """Return [(samples per unit at the nearest strand, diameter [samples])] of [(`StrandsOnGPU`, object to world)].
+
+    Both are infinite if the viewer is inside of the hair's sphere.
+    """
+    centres, radii = drawing.bounding_spheres(placed)
+    per_unit = np.full(len(placed), float(view["pixels_per_unit"]))
     if view["is_perspective"]:
-        distance = float(np.linalg.norm(view["eye"][:3] - centre)) - radius
-        samples_per_unit = samples_per_unit / distance if distance > 0.0 else np.inf
-    return samples_per_unit, 2.0 * radius * samples_per_unit
+        distances = np.linalg.norm(view["eye"][:3] - centres, axis=1) - radii
+        per_unit = np.divide(per_unit, distances, out=np.full(len(placed), np.inf), where=distances > 0.0)
+    return list(zip(per_unit.tolist(), (2.0 * radii * per_unit).tolist(), strict=True))

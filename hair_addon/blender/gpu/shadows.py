@@ -162,8 +162,9 @@ class ShadowMaps:
             drawing.cleared(self._drawing_depth, _NO_SURFACE),
             drawing.gpu_state("LESS_EQUAL", depth_writes=True),
         ):
+            light_block = uniforms.uniform_buffer(lights)
             for surface in surfaces:
-                surface_textures.draw_depth(surface, view, lights)
+                surface_textures.draw_depth(surface, view, light_block)
         self._blur(layer, _blur_of(light, self._size))
         self._surfaces[layer] = drawn_with
         return True

@@ -5,7 +5,7 @@ A pose uploads the positions of vertices, twelve bytes each. An object that move
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import groupby
 
 import gpu
@@ -169,6 +169,7 @@ def packed_colors(colors):
     return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
 
 
+@cache
 def _row_of(count):
     """Number of vectors per row of a texture of `count` vectors: a third of a small number."""
     return min(int(avoid_powers_of_two(-(-count // 3))), _ROW_VERTICES)
@@ -194,13 +195,14 @@ def _texture_of(vectors, known):
 _COLORED = "shadows/shadow_surface.frag"  # the only shader that reads a material's color
 
 
-def draw_depth(surface, view, lights, fragment=_COLORED, clip_planes=None):
+def draw_depth(surface, view, light_block, fragment=_COLORED, clip_planes=None):
     """Draw a `SurfaceOnGPU` into a shadow map's first pass, or as an occluder: surfaces/occluding_surface.frag.
 
-    clip_planes: (6, 4) that clip an occluder, None for none.
+    light_block: `uniforms.LIGHTS` on the GPU, for any number of surfaces; clip_planes: (6, 4) that clip an occluder,
+    None for none.
     """
     program = surface_programs.depth_program(fragment, clip_planes is not None)
-    placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
+    placed = surface.placed(view)
     clipping = uniforms.clipping_blocks(clip_planes)
     first, has_color = 0, fragment == _COLORED
     for color, parts in groupby(surface.corners.colors, key=lambda part: part[1] if has_color else 0.0):

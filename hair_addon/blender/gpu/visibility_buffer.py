@@ -7,6 +7,7 @@ If the graphics driver supports it, a compute program also finds the nearest seg
 
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import gpu
 import numpy as np
@@ -35,6 +36,16 @@ class _Placed:
     lights: gpu.types.GPUUniformBuf
     window: tuple  # of `windows`
     is_round: bool  # whether any strand is so wide that its bends and ends are visible
+
+    @cached_property
+    def view(self):
+        """The record on the GPU."""
+        return uniforms.uniform_buffer(self.record)
+
+    @property
+    def is_seen(self):
+        """Whether any part of the picture may show the hair."""
+        return all(self.window[2:])
 
     @property
     def segment_count(self):
@@ -140,7 +151,7 @@ class VisibilityBuffer:
             drawing.gpu_state("ALWAYS", depth_writes=True),
             drawing.bound(program, {}, {"segments": self.segments}),
         ):
-            for window in (placed.window for placed in self._hair if all(placed.window[2:])):
+            for window in (placed.window for placed in self._hair if placed.is_seen):
                 with windows.drawn_in(window):
                     drawing.cover(program)
 
@@ -184,16 +195,19 @@ class VisibilityBuffer:
         """Return [_Placed] from the arguments of `find_hair`."""
         found, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
-        for index, (strands, shading, to_world, samplers, steps) in enumerate(hair):
-            record = drawing.strand_record(strands, view, to_world, steps)
+        placed = [
+            (strands, drawing.strand_record(strands, view, to_world, steps))
+            for strands, _shading, to_world, _samplers, steps in hair
+        ]
+        all_windows = windows.of_strands(placed, self.size)
+        are_round = windows.may_be_wide(placed, self.size, visibility_programs.LEAST_BEND)
+        for index, ((strands, record), (_, shading, _, samplers, _)) in enumerate(zip(placed, hair, strict=True)):
             record["first_segment"] = first
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
-            light_block = light_blocks[index if lights.shape else 0]
-            window = windows.of_strands(strands, record, self.size)
-            is_round = windows.may_be_wide(strands, record, self.size, visibility_programs.LEAST_BEND)
-            found.append(_Placed(strands, shading, record, samplers, first, light_block, window, is_round))
+            light_block, place = light_blocks[index if lights.shape else 0], (all_windows[index], are_round[index])
+            found.append(_Placed(strands, shading, record, samplers, first, light_block, *place))
             first += found[-1].segment_count
         return found
 
@@ -281,14 +295,11 @@ class VisibilityBuffer:
     def _find(self):
         """Find the nearest segments by compute programs: first depths, then indices."""
         self._copy_depths(is_start=True)
-        self._provide_runs(sum(placed.run_count for placed in self._hair))
+        self._provide_runs(sum(placed.run_count for placed in self._hair if placed.is_seen))
         self._is_color_stale = self._has_strips = False
         clipping = uniforms.clipping_blocks(self._clip_planes)
-        all_blocks = [
-            {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} | clipping
-            for placed in self._hair
-        ]
-        if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
+        all_blocks = [{"view": placed.view, "lights": placed.lights} | clipping for placed in self._hair]
+        if sum(placed.segment_count for placed in self._hair if placed.is_seen) < _FEW_SEGMENTS:
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
@@ -316,6 +327,8 @@ class VisibilityBuffer:
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
         samplers, first_run = {"farthest_depths": self._farthest}, 0
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
+            if not placed.is_seen:
+                continue
             constants = {"first_run": first_run, "are_tiles_known": int(are_tiles_known)}
             program = scene_programs.segments_program(is_depth, placed.is_round, self._clip_planes is not None)
             first_run += placed.run_count
@@ -345,7 +358,7 @@ class VisibilityBuffer:
         """Find the nearest segments by drawing triangle strips."""
         program = scene_programs.strip_segments_program(self._clip_planes is not None)
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            for placed in self._hair:
+            for placed in filter(lambda placed: placed.is_seen, self._hair):
                 drawing.draw_strip(placed.strands, program, placed.record, placed.lights, clip_planes=self._clip_planes)
         self._has_strips = True
 
@@ -362,7 +375,7 @@ class VisibilityBuffer:
             program.bind()
             for name, value in (parts or {}).items():
                 program.uniform_float(name, value)
-            textures, record = dict(shading.samplers), placed.record.copy()
+            textures, record = dict(shading.samplers), None
             if shading.is_mapped:
                 textures["strand_looks"] = placed.strands.looks
             elif shading.is_varied:
@@ -371,16 +384,17 @@ class VisibilityBuffer:
                 program.uniform_float("wetness_range", mix.wetness_range)
                 program.uniform_int("is_wet", int(mix.is_wet))
                 textures["strand_wetness"] = placed.strands.wetness
+                record = placed.record.copy()
                 record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             self._fill(placed, program, picture, shading.blocks, textures, record)
 
     def _fill(self, placed, program, picture, blocks, textures, record=None):
         """Run a program on the samples in which a hair is nearest; record: replaces the hair's record."""
         left, bottom, *size = placed.window
-        if not all(size):
+        if not placed.is_seen:
             return
-        record = placed.record if record is None else record
-        blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
+        view = placed.view if record is None else uniforms.uniform_buffer(record)
+        blocks = {"view": view, "lights": placed.lights, **blocks}
         grid = light_grid.none()
         textures = {"light_grid": grid, **placed.samplers, **textures}
         textures |= {"segments": self.segments, **drawing.strand_samplers(placed.strands)}

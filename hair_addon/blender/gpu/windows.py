@@ -12,8 +12,8 @@ _IS_FAR = (
 
 
 def corners_of(bounds):
-    """Return (8, 3) corners of a box; bounds: (2, 3) least and greatest coordinates."""
-    return np.where(_IS_FAR, bounds[1], bounds[0])
+    """Return (..., 8, 3) corners of boxes; bounds: (..., 2, 3) least and greatest coordinates."""
+    return np.where(_IS_FAR, bounds[..., 1:, :], bounds[..., :1, :])
 
 
 def of_box(bounds, to_clip, size, margin=1.0):
@@ -21,34 +21,43 @@ def of_box(bounds, to_clip, size, margin=1.0):
 
     to_clip: (4, 4) from the box's coordinates; margin: around the box [samples].
     """
-    clip = _corners_in_clip(bounds, to_clip)
-    return (0, 0, *size) if clip is None else _around(clip, size, margin)
+    clip = _corners_in_clip(bounds[None], np.asarray(to_clip, np.float64)[None])
+    return _around(clip, _are_in_front(clip), size, margin)[0]
 
 
-def of_strands(strands, record, size):
-    """Return the window of `StrandsOnGPU`; record: of `drawing.strand_record`; size: of the picture [samples]."""
-    clip = _corners_in_clip(strands.bounds, record["object_to_clip"].T)
-    if clip is None:
-        return 0, 0, *size
-    half_width = max(_half_width_at(strands, record, clip[3].min()), 0.0)
-    half_width = max(half_width, float(record["least_half_width"] * record["pixels_per_unit"]))
+def of_strands(placed, size):
+    """Return the windows of [(`StrandsOnGPU`, record of `drawing.strand_record`)], all at once.
+
+    size: of the picture [samples].
+    """
+    if not placed:
+        return []
+    records = _records(placed)
+    clip = _corners_in_clip(*_boxes(placed, records))
+    half_width = np.maximum(_half_widths(placed, records, clip), 0.0)
+    half_width = np.maximum(half_width, records["least_half_width"] * records["pixels_per_unit"])
     # A strip is up to √2 wider along an axis of the picture than across its own axis; samples are jittered.
-    return _around(clip, size, 1.5 * half_width + 1.0 + 0.5 * float(record["sample_offset"]))
+    return _around(clip, _are_in_front(clip), size, 1.5 * half_width + 1.0 + 0.5 * records["sample_offset"])
 
 
-def may_be_wide(strands, record, size, half_width):
-    """Whether any strand may reach a half width [samples] in a picture; arguments as for `of_strands`."""
-    to_clip = record["object_to_clip"].T.astype(np.float64)
-    clip = _corners_in_clip(strands.bounds, to_clip)
-    if clip is None:
-        return True
+def may_be_wide(placed, size, half_width):
+    """Return whether any strand may reach a half width [samples] in a picture, for each of `placed`.
+
+    placed, size: as for `of_strands`.
+    """
+    if not placed:
+        return []
+    records = _records(placed)
+    bounds, to_clip = _boxes(placed, records)
+    clip = _corners_in_clip(bounds, to_clip)
     # `width_stretch` of shaders/visibility/segment.glsl at the picture's corner farthest from its axis.
-    stretch = 1.0
-    if record["is_perspective"]:
-        axis = to_clip @ np.append(to_clip[3, :3], 0.0)
-        beside = np.maximum(np.abs(axis[:2] / axis[3]) + 1.0, 2.0) * 0.5 * np.array(size)
-        stretch = (1.0 + (beside @ beside) / float(record["pixels_per_unit"]) ** 2) ** 0.5
-    return stretch * _half_width_at(strands, record, clip[3].min()) >= half_width
+    forward = np.where(records["is_perspective"][:, None] != 0, to_clip[:, 3, :3], [0.0, 0.0, 1.0])
+    axis = (to_clip[:, :, :3] @ forward[..., None])[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beside = np.maximum(np.abs(axis[:, :2] / axis[:, 3:]) + 1.0, 2.0) * 0.5 * np.array(size)
+        stretch = (1.0 + (beside**2).sum(axis=1) / records["pixels_per_unit"].astype(np.float64) ** 2) ** 0.5
+    widths = np.where(records["is_perspective"] != 0, stretch, 1.0) * _half_widths(placed, records, clip)
+    return (~_are_in_front(clip) | (widths >= half_width)).tolist()
 
 
 @contextmanager
@@ -60,21 +69,45 @@ def drawn_in(window):
     gpu.state.viewport_set(*before)
 
 
-def _around(clip, size, margin):
-    """Return the window around (4, 8) corners in clip space."""
-    places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
-    low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
-    high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)
-    return (*low.tolist(), *(high - low).tolist())
+def _around(clip, are_in_front, size, margin):
+    """Return the windows around (N, 4, 8) corners in clip space; that of the picture for boxes behind the viewer."""
+    w = np.where(are_in_front[:, None, None], clip[:, 3:], 1.0)
+    places = (0.5 * clip[:, :2] / w + 0.5) * np.array(size)[:, None]
+    margin = np.broadcast_to(margin, len(clip))[:, None]
+    low = np.clip(np.floor(places.min(axis=2) - margin), 0, size).astype(int)
+    high = np.clip(np.ceil(places.max(axis=2) + margin), 0, size).astype(int)
+    found = np.where(are_in_front[:, None], np.append(low, high - low, axis=1), (0, 0, *size))
+    return list(map(tuple, found.tolist()))
+
+
+def _records(placed):
+    """Return the records of [(`StrandsOnGPU`, record)] as an array: NumPy's `stack` takes twenty times longer."""
+    records = np.empty(len(placed), placed[0][1].dtype)
+    for index, (_strands, record) in enumerate(placed):
+        records[index] = record
+    return records
+
+
+def _boxes(placed, records):
+    """Return (N, 2, 3) bounds and (N, 4, 4) matrices to clip space of [(`StrandsOnGPU`, record)]."""
+    bounds = np.stack([strands.bounds for strands, _record in placed])
+    return bounds, records["object_to_clip"].transpose(0, 2, 1).astype(np.float64)
 
 
 def _corners_in_clip(bounds, to_clip):
-    """Return (4, 8) corners of a box in clip space; None if any part is behind the viewer."""
-    clip = np.asarray(to_clip, np.float64) @ np.append(corners_of(bounds), np.ones((8, 1)), axis=1).T
-    return clip if (clip[2] + clip[3]).min() > 0.0 and clip[3].min() > 0.0 else None
+    """Return (N, 4, 8) corners of (N, 2, 3) boxes in clip space."""
+    corners = corners_of(bounds)
+    return to_clip @ np.append(corners, np.ones((*corners.shape[:-1], 1)), axis=-1).transpose(0, 2, 1)
 
 
-def _half_width_at(strands, record, w):
-    """Greatest half width [samples] of strands on the picture's axis, at a clip-space w."""
-    scale = float(record["object_scale"] * record["thickness"] * record["pixels_per_unit"])
-    return scale * strands.greatest_radius / w
+def _are_in_front(clip):
+    """Return (N,) whether no part of a box is behind the viewer."""
+    return ((clip[:, 2] + clip[:, 3]).min(axis=1) > 0.0) & (clip[:, 3].min(axis=1) > 0.0)
+
+
+def _half_widths(placed, records, clip):
+    """Return the greatest half width [samples] of each hair on the picture's axis; infinite behind the viewer."""
+    scale = records["object_scale"].astype(np.float64) * records["thickness"] * records["pixels_per_unit"]
+    w = clip[:, 3].min(axis=1)
+    radii = np.array([strands.greatest_radius for strands, _record in placed])
+    return np.divide(scale * radii, w, out=np.full(len(w), np.inf), where=w > 0.0)

@@ -32,7 +32,8 @@ def draw(drawn, name, world_to_view, view, buffer):
     with buffer.surfaces_of_part(picture_programs.DATA_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, parts), lights, samplers in surfaces:
             if parts is None:
-                surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
+                light_block = uniforms.uniform_buffer(lights)
+                surface_textures.draw_depth(surface, view, light_block, "surfaces/occluding_surface.frag")
             else:
                 record["has_uvs"] = surface.corners.uvs is not None
                 surface_shading.draw_data(surface, parts, view, lights, samplers, record)

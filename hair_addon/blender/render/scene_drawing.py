@@ -4,7 +4,9 @@
 from dataclasses import replace
 
 from ..gpu import ambient_visibility, drawing, level_of_detail, surface_shading, surface_textures, world_texture
-from ..gpu.programs import picture_programs, surface_programs
+from ..gpu.programs import picture_programs, surface_programs, uniforms
+
+_OCCLUDING = "surfaces/occluding_surface.frag"
 
 
 def draw_hiding(drawn, view, clip_planes=None):
@@ -12,9 +14,10 @@ def draw_hiding(drawn, view, clip_planes=None):
 
     clip_planes: (6, 4) of `uniforms.CLIPPING` that clip surfaces, None for none.
     """
+    light_block = uniforms.uniform_buffer(drawn.lights)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
-            surface_textures.draw_depth(surface, view, drawn.lights, "surfaces/occluding_surface.frag", clip_planes)
+            surface_textures.draw_depth(surface, view, light_block, _OCCLUDING, clip_planes)
 
 
 def draw(drawn, view, buffer, is_transparent):
@@ -90,9 +93,12 @@ def _hair_lights(drawn):
 
 
 def _hair_in_view(drawn, view, is_viewport):
+    all_steps = [drawing.Steps()] * len(drawn.hair)
+    if is_viewport:
+        all_steps = level_of_detail.steps_of([(strands, *place) for strands, _shading, *place in drawn.hair], view)
     hair = []
-    for (strands, shading, to_world, limits), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
-        steps = level_of_detail.steps_of(strands, view, to_world, limits) if is_viewport else drawing.Steps()
+    for one, seen, steps in zip(drawn.hair, drawn.hair_visibility, all_steps, strict=True):
+        strands, shading, to_world, _limits = one
         if drawn.is_wire:
             steps = replace(steps, thickness=_WIRE_THICKNESS)
         hair.append((strands, shading, to_world, drawn.shadow_maps.samplers | seen, steps))
@@ -151,7 +157,7 @@ def _draw_by_lights(drawn, view, fragment, is_left_out=None):
     lit = zip(drawn.surfaces, *light_of(drawn, solid=True), is_left_out, strict=True)
     for (surface, _parts), lights, samplers, is_empty in lit:
         if is_empty:
-            surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
+            surface_textures.draw_depth(surface, view, uniforms.uniform_buffer(lights), _OCCLUDING)
             continue
         surface_textures.draw_lit(surface, program, view, lights, samplers)
 
@@ -203,7 +209,7 @@ def _draw_over_surfaces(drawn, view):
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, parts), lights in zip(drawn.surfaces, light_of(drawn, solid=True)[0], strict=True):
             if parts is None:
-                surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag")
+                surface_textures.draw_depth(surface, view, uniforms.uniform_buffer(lights), _OCCLUDING)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
         for (surface, parts), lights, samplers in zip(drawn.clear, *light_of(drawn, solid=False), strict=True):
             surface_shading.draw_clear(surface, parts, view, lights, samplers)

@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures
 from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.blender.render import drawn_scene
@@ -14,6 +15,7 @@ from hair_addon.blender.render.viewport import hair_picture
 from tests.support.pictures import glsl
 
 SIZE = 96
+IDENTITY = np.eye(4)
 
 
 def seen_from(distance, size=SIZE):
@@ -25,7 +27,11 @@ def seen_from(distance, size=SIZE):
 def steps_from(strands, distance, part=1.0, coverage_turn=0.0, is_reduced=True):
     view = drawing.view_record(*seen_from(distance), SIZE, least_width=1.0)
     view["coverage_turn"] = coverage_turn
-    return level_of_detail.steps_of(strands, view, np.eye(4), level_of_detail.Limits(part, is_reduced))
+    return steps_of(strands, view, limits=level_of_detail.Limits(part, is_reduced))
+
+
+def steps_of(strands, view, to_world=IDENTITY, limits=level_of_detail.NO_LIMITS):
+    return level_of_detail.steps_of([(strands, to_world, limits)], view)[0]
 
 
 @pytest.fixture
@@ -34,26 +40,26 @@ def many(rng):
     roots = rng.normal(size=(50_000, 1, 3))
     roots /= np.linalg.norm(roots, axis=2, keepdims=True)
     points = (roots * np.linspace(1.0, 1.4, 41)[:, None]).astype(np.float32)
-    return strand_textures.upload_strands(points, np.full(points.shape[:2], 4e-3, np.float32))
+    return strand_textures.upload_strands(points, np.full(points.shape[:2], 1e-4, np.float32))
 
 
 def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
-    steps = [steps_from(many, distance) for distance in np.geomspace(1.5, 300.0, 400)]
+    steps = [steps_from(many, distance) for distance in (1.5, *np.geomspace(3.5, 300.0, 400))]
     counts, points = (np.array([getattr(one, name) for one in steps]) for name in ("strand_count", "point_count"))
     assert (counts[0], points[0]) == (50_000, 41)
     assert (np.diff(counts) <= 0).all() and (np.diff(points) <= 0).all()
     assert counts[-1] == counts[-50] < 20_000 and points[-1] == 9
-    assert (counts[1:] > 0.9 * counts[:-1]).all()  # a step of the distance is 1.3 %
+    assert (counts[2:] > 0.9 * counts[1:-1]).all()  # a step of the distance is 1.1 %
 
 
 def test_the_level_of_detail_has_no_scale(many):
     """Hair in another unit, seen from as many of its diameters, has as many strands and points."""
     view = drawing.view_record(*seen_from(8.0), SIZE)
-    steps = level_of_detail.steps_of(many, view, np.eye(4))
+    steps = steps_of(many, view)
     assert steps.strand_count < 50_000 and steps.point_count < 41
     for scale in (0.01, 100.0):
         view = drawing.view_record(*seen_from(8.0 * scale), SIZE)
-        same = level_of_detail.steps_of(many, view, np.diag([scale, -scale, scale, 1.0]))
+        same = steps_of(many, view, np.diag([scale, -scale, scale, 1.0]))
         assert abs(same.strand_count - steps.strand_count) <= 1 and same.point_count == steps.point_count
 
 
@@ -136,7 +142,7 @@ def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     some = picture()
     steps, strands = steps_from(drawn.hair[0][0], distance), drawn.hair[0][0]
     assert steps.strand_count < strands.strand_count
-    monkeypatch.setattr(level_of_detail, "steps_of", lambda *_args: drawing.Steps())
+    monkeypatch.setattr(level_of_detail, "steps_of", lambda hair, _view: [drawing.Steps()] * len(hair))
     np.testing.assert_allclose(some, picture(), rtol=0.06)
 
 
@@ -169,7 +175,7 @@ def heads_in(columns):
     assert len(drawn.hair) == len(columns) and len({id(strands) for strands, *_ in drawn.hair}) == 1
     world_to_view, view_to_clip = seen_from(0.0)
     view_to_clip[[0, 1], [0, 1]] = 2.0 * FOCUS / np.array(CROWD)
-    found = hair_picture.HairPicture(CROWD, 2)
+    found = hair_picture.HairPicture(CROWD, 6)
     while not found.is_fine:
         found.add_pass(drawn, world_to_view, view_to_clip)
     means = []
@@ -179,9 +185,14 @@ def heads_in(columns):
     return np.array(means)
 
 
-def test_each_head_of_a_crowd_is_as_bright_and_covers_as_much_as_with_all_strands(thin):
-    """At eight distances, mean color and coverage of linked heads are within 2 / 255 of those of all strands."""
-    thin.data.vellus.hair.strand_count, thin.data.vellus.hair.radius = 6000, 0.0026
+def test_each_head_of_a_crowd_is_as_bright_and_covers_as_much_as_with_all_strands(thin, monkeypatch):
+    """At eight distances, mean color and coverage of linked heads are within 2 / 255 of those of all strands.
+
+    The heads have locks. Pictures have three times as many samples as viewports, for less noise.
+    """
+    monkeypatch.setattr(hair_picture, "SAMPLE_COUNT", 108)
+    thin.data.vellus.hair.strand_count, thin.data.vellus.hair.radius = 10_000, 0.0004
+    api.set_styles(thin.data, [api.Clump(size=0.15, amount=1.0)])
     bpy.context.view_layer.update()
     state = thin.data.vellus
     columns = crowd_beside(thin, np.geomspace(7.0, 45.0, 8))

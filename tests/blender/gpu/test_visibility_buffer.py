@@ -39,7 +39,8 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, 
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
             surface = surface_textures.upload_surface(corners, np.arange(6, dtype=np.int32))
-            surface_textures.draw_depth(surface, view, lights, "surfaces/occluding_surface.frag", clip_planes)
+            light_block = uniforms.uniform_buffer(lights)
+            surface_textures.draw_depth(surface, view, light_block, "surfaces/occluding_surface.frag", clip_planes)
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
@@ -236,9 +237,26 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
             strand_textures.upload_strands(points, radii),
             drawing.pass_record(np.eye(4), view_to_clip, SIZE),
         )
-        left, bottom, width, height = windows.of_strands(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
+        record = drawing.strand_record(on_gpu, view, to_world)
+        ((left, bottom, width, height),) = windows.of_strands([(on_gpu, record)], SIZE)
         assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()
         assert width * height < 0.5 * SIZE[0] * SIZE[1]
+
+
+def test_hair_outside_of_the_view_is_not_rasterized(shading, rng, monkeypatch):
+    """Of a crowd, only the heads in view take time on the GPU; the others change no sample."""
+    points, radii = tuft(rng, strand_count=12, thickness=0.02)
+    places = [np.diag([0.15, 0.1, 0.1, 1.0]) for _ in range(5)]
+    for to_world, x in zip(places, (9.0, 0.1, -9.0, 0.0, 9.0), strict=True):
+        to_world[:3, 3] = x, 0.0, -1.0
+    rasterized, rasterize = [], drawing.rasterize_strands
+    monkeypatch.setattr(drawing, "rasterize_strands", lambda *given: rasterized.append(given) or rasterize(*given))
+    segments, depths = drawn([(points, radii, to_world) for to_world in places], PERSPECTIVE, shading, True)
+    assert len(rasterized) == 2 * 2  # depths, then segments
+    alone, same = drawn([(points, radii, places[1]), (points, radii, places[3])], PERSPECTIVE, shading, True)
+    np.testing.assert_array_equal(depths, same)
+    count = len(points) * (points.shape[1] - 1)
+    np.testing.assert_array_equal(segments[segments >= 0] // count, 2 * (alone[alone >= 0] // count) + 1)
 
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
@@ -262,9 +280,9 @@ def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(sh
         to_world = np.diag([0.15, 0.1, 0.1, 1.0])
         to_world[:3, 3] = x, 0.0, -0.6
         placed, found = [(points, radii, to_world)], []
-        monkeypatch.setattr(windows, "may_be_wide", lambda *given: chosen.append(may_be_wide(*given)) or chosen[-1])
+        monkeypatch.setattr(windows, "may_be_wide", lambda *given: chosen.extend(may_be_wide(*given)) or chosen[-1:])
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
-        monkeypatch.setattr(windows, "may_be_wide", lambda *_given: True)
+        monkeypatch.setattr(windows, "may_be_wide", lambda *_given: [True])
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
         for chosen_program, whole_program in zip(*found, strict=True):
             np.testing.assert_array_equal(chosen_program, whole_program)

@@ -74,10 +74,10 @@ def _window(drawn, camera, size, is_shadowed):
     surfaces.
     """
     view = drawing.pass_record(*camera, size)
-    found = [
-        windows.of_strands(strands, drawing.strand_record(strands, view, to_world), size)
-        for strands, _shading, to_world, *_ in drawn.hair
+    placed = [
+        (strands, drawing.strand_record(strands, view, to_world)) for strands, _shading, to_world, *_ in drawn.hair
     ]
+    found = windows.of_strands(placed, size)
     if is_shadowed:
         for (surface, _parts), is_darkened in zip(drawn.surfaces, drawn.is_shadowed, strict=True):
             if is_darkened:
