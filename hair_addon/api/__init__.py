@@ -53,7 +53,16 @@ from .grooms import (
 )
 from .guide_layers import add_layer, apply_layers, layers, set_layer
 from .guide_tools import change_guides
-from .imports import DerivationSettings, TransferSettings, import_curves, transfer_groom, use_as_guides, use_as_hair
+from .imports import (
+    DerivationSettings,
+    MeshStrandSettings,
+    TransferSettings,
+    import_curves,
+    mesh_to_hair,
+    transfer_groom,
+    use_as_guides,
+    use_as_hair,
+)
 from .library import apply_groom, groom_names, save_groom
 from .maps import MapSettings, clear_map, maps_of, set_map, set_thickness_curve, thickness_curve_of
 from .pictures import draw, render
@@ -72,6 +81,7 @@ __all__ = [
     "HairError",
     "HairSettings",
     "MapSettings",
+    "MeshStrandSettings",
     "TransferSettings",
     "TubeSettings",
     "add_hair",
@@ -101,6 +111,7 @@ __all__ = [
     "make_hair_cards",
     "make_hair_tubes",
     "maps_of",
+    "mesh_to_hair",
     "points",
     "remove_delivery",
     "render",

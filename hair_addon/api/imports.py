@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import geometry, grooming
+from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.files.curve_file import TO_Z_UP, Convention, parsed_unit
 from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands, curve_offsets, from_numpy
@@ -23,13 +24,23 @@ if TYPE_CHECKING:
     from ..blender.groom.foreign.kept_hair import KeptHair
     from ..blender.groom.transfer.groom_transfers import TransferredGroom
     from ..blender.io.curve_files import Found
+    from ..blender.io.mesh_hair import MeshHair
 
 
 Curves = Any
 MeshObject = Any
 Arrays = TriMesh | tuple[ArrayLike, ArrayLike]
 
-__all__ = ["DerivationSettings", "TransferSettings", "import_curves", "transfer_groom", "use_as_guides", "use_as_hair"]
+__all__ = [
+    "DerivationSettings",
+    "MeshStrandSettings",
+    "TransferSettings",
+    "import_curves",
+    "mesh_to_hair",
+    "transfer_groom",
+    "use_as_guides",
+    "use_as_hair",
+]
 
 
 def use_as_guides(
@@ -122,6 +133,40 @@ def use_as_hair(
         applies_modifiers=applies_modifiers,
         follows_guides=follows_guides,
         guides_object=None if guides is None else curves_object_of(guides),
+    )
+    return run_now(work, progress)
+
+
+def mesh_to_hair(
+    mesh: MeshObject,
+    surface: MeshObject,
+    settings: MeshStrandSettings | None = None,
+    *,
+    guide_count: int = 400,
+    hides_mesh: bool = True,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> "MeshHair":
+    """Turn a mesh object of hair cards, tubes or solid locks into hair on a surface, and derive guides from it.
+
+    settings: `MeshStrandSettings`; changes: its fields by name; guide_count: as of `use_as_hair`; hides_mesh: hide the
+    mesh object. Strands run from the root end to the tip end of each piece; the colors of the mesh's material or color
+    attribute become a map of their color. The result has `hair` and `guides`, the Curves, `piece_count`, the number of
+    used pieces, and `skipped_count`, of pieces that are neither cards nor slender.
+
+    >>> tubes = api.make_hair_tubes(bpy.data.objects["Hair"], tube_count=100)
+    >>> made = api.mesh_to_hair(tubes, bpy.data.objects["Scalp"], strand_count=100, guide_count=20)
+    >>> len(made.hair.curves), len(made.guides.curves), made.piece_count, made.skipped_count
+    (100, 20, 100, 0)
+    """
+    wanted, progress = changed(MeshStrandSettings, settings, changes), checked_progress(progress)
+    work = blender.io.mesh_hair.using_mesh(
+        blender.data.arguments.surface_object(mesh),
+        blender.data.arguments.surface_object(surface),
+        blender.data.scene.present_depsgraph(),
+        wanted,
+        DerivationSettings(guide_count=guide_count),
+        hides_mesh=hides_mesh,
     )
     return run_now(work, progress)
 

@@ -78,6 +78,7 @@ _OPERATORS = {
     "groom_library": ("save_groom", "apply_groom"),
     "use_as_guides": ("use_as_guides",),
     "use_as_hair": ("use_as_hair", "import_groom", "convert_particles"),
+    "mesh_to_hair": ("mesh_to_hair",),
     "transfer_groom": ("transfer_groom",),
     "rendering": ("toggle_composite",),
     "cards": ("hair_cards", "hair_tubes"),

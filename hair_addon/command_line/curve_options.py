@@ -2,8 +2,12 @@
 """Options of commands that read curves from a file: selection, unit and up axis."""
 
 from ..core import lazy
+from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.errors import HairError
 from ..core.files.curve_file import ENDINGS, UNITS, Convention, parsed_unit
+from ..core.params import declared
+
+_ROOT_ENDS = next(d.choices for name, _default, d in declared(MeshStrandSettings) if name == "root_end")
 
 blender = lazy.Package("..blender", __package__)
 
@@ -28,6 +32,21 @@ def add_curves(parser):
         help="use the curves of such a file as hair, unchanged, with its guides or with derived ones (--guides)",
     )
     parser.add_argument(
+        "--from-mesh",
+        metavar="NAME",
+        help="turn a mesh object of cards, tubes or solid locks in the input file into hair, with derived guides",
+    )
+    parser.add_argument(
+        "--mesh-roots",
+        choices=[value for value, *_ in _ROOT_ENDS],
+        help="root ends of --from-mesh: nearest to the surface, or by the V coordinate [SURFACE]",
+    )
+    parser.add_argument(
+        "--fill-thickness",
+        action="store_true",
+        help="with --from-mesh: strands fill their card, tube or lock together",
+    )
+    parser.add_argument(
         "--object",
         "--guides-object",
         dest="object",
@@ -47,6 +66,10 @@ def checked(given):
     came_from = given.guides_from or given.hair_from
     if given.guides_from and given.hair_from:
         raise HairError("--guides-from and --hair-from exclude each other.")
+    if given.from_mesh and came_from:
+        raise HairError("--from-mesh has the hair: leave out --guides-from and --hair-from.")
+    if (given.mesh_roots or given.fill_thickness) and not given.from_mesh:
+        raise HairError("--mesh-roots and --fill-thickness need --from-mesh.")
     for name in ("object", "unit"):
         if getattr(given, name) and not came_from:
             raise HairError(f"--{name} needs --guides-from or --hair-from.")

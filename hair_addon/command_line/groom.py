@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from ..core import lazy
+from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.errors import HairError
 from ..core.grooming.derived_guides import DerivationSettings
 from ..core.grooming.groom import GuideSettings, HairSettings
@@ -53,9 +54,10 @@ def run(given, console):
         settings = options.changed_groom(replace(settings, appearance=look), given)
 
     came_from = curve_options.checked(given)
-    if given.from_library and (came_from or given.settings):
+    if given.from_library and (came_from or given.from_mesh or given.settings):
         raise HairError(
-            "--from-library includes guides and settings: leave out --guides-from, --hair-from and --settings."
+            "--from-library includes guides and settings: leave out --guides-from, --hair-from, --from-mesh and "
+            "--settings."
         )
     if came_from:
         blender.io.curve_files.require_readable(came_from)
@@ -69,6 +71,8 @@ def run(given, console):
         guides, hair = _from_library(given, surface, console)
     elif given.guides_from:
         guides, hair = _follow_curves(given, surface, settings, file_axes, console)
+    elif given.from_mesh:
+        guides, hair = _of_mesh(given, surface, settings, console)
     elif given.hair_from:
         guides, hair = _keep_curves(given, surface, settings, file_axes, console)
     else:
@@ -163,11 +167,48 @@ def _keep_curves(given, surface, settings, file_axes, console):
         console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
     if found.motion is not None:
         _play(given, made, found, console)
+    _assign(made, settings)
+    blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
+    return made.guides, made.hair
+
+
+def _of_mesh(given, surface, settings, console):
+    """Return (guides, hair) of a mesh of cards, tubes or locks in the open file."""
+    useless = options.options_given(given, [s for s in _OF_GROWTH if s[0] not in ("strand_count", "seed")])
+    useless += (["--style"] if given.styles else []) + (["--style-preset"] if given.style_preset else [])
+    _warn_of_useless(useless, f"Strands follow the mesh {given.from_mesh}", console)
+    mesh_object = blender.io.mesh_files.find_surface(given.from_mesh)
+    wanted = MeshStrandSettings(
+        strand_count=settings.hair.strand_count,
+        seed=settings.hair.seed,
+        root_end=given.mesh_roots or "SURFACE",
+        fills=given.fill_thickness,
+    )
+    work = blender.io.mesh_hair.using_mesh(
+        mesh_object,
+        surface,
+        blender.data.scene.present_depsgraph(),
+        wanted,
+        DerivationSettings(guide_count=settings.guides.guide_count),
+    )
+    made = run_now(work, console.progress)
+    for sentence, values in made.notes():
+        console.warn(sentence.format(**values))
+    own, look = blender.groom.transfer.groom_settings.maps_of(made.hair), settings.appearance
+    if own:  # the colors of the mesh
+        present = blender.settings.properties.own_look_of(made.hair.vellus)
+        look = replace(look, parametrization="COLOR", color=present.color)
+    maps = {one.setting: one for one in (*own, *settings.maps)}
+    _assign(made, replace(settings, maps=tuple(maps.values())))
+    blender.groom.transfer.groom_settings.assign_look(made.hair, look)
+    return made.guides, made.hair
+
+
+def _assign(made, settings):
+    """Assign maps, thickness and dynamics of `GroomSettings` to hair and guides."""
     blender.groom.transfer.groom_settings.assign_maps(made.hair, settings.maps)
     blender.groom.transfer.groom_settings.assign_thickness_curve(made.hair, settings.thickness_curve)
-    blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
     blender.groom.transfer.groom_settings.assign_dynamics(made.guides, settings.dynamics)
-    return made.guides, made.hair
 
 
 def _play(given, made, found, console):

@@ -17,6 +17,7 @@ from hair_addon.blender.settings import map_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support import file_digest, folder_digest
+from tests.support.exchange.card_meshes import card_object
 from tests.support.exchange.imported import curves_object, lines_on, select
 
 PACKAGE = str(Path(whole_changes.__file__).parents[1])
@@ -98,6 +99,14 @@ def on_styled(_rng):
     bpy.context.view_layer.update()
 
 
+def on_cards(rng):
+    cards = card_object(list(lines_on(things("Sphere"), rng, 8)), 0.05)
+    layer = cards.data.color_attributes.new("Color", "FLOAT_COLOR", "POINT")
+    cards.data.color_attributes.active_color = layer
+    select(things("Sphere"), cards)
+    bpy.context.view_layer.update()
+
+
 def on_selected_guides(rng):
     on_styled(rng)
     guides = bpy.data.hair_curves["Guides"]
@@ -162,6 +171,7 @@ MAKING = {
     "use_as_hair": [(on_drawn, {"guide_count": 4}), (on_two, {"guide_count": 4})],
     "import_groom": [(on_exported, {"filepath": "read.abc", "guide_count": 4})],
     "convert_particles": [(on_particles, {"guide_count": 4})],
+    "mesh_to_hair": [(on_cards, {"guide_count": 4, "strand_count": 12})],
     "transfer_groom": [(on_other_mesh, {"target": "Other"})],
     "make_own_guides": [(on_shared_guides, {})],
     "restore_guides": [(on_lost_guides, {})],
@@ -354,6 +364,8 @@ REFUSED = [
     ("use_as_guides", on_two, {"density_group": "nope"}),
     ("use_as_hair", on_two, {"surface": "nope"}),
     ("convert_particles", on_no_particles, {}),
+    ("mesh_to_hair", on_cards, {"surface": "nope"}),
+    ("mesh_to_hair", on_other_mesh, {"surface": "Sphere"}),
     ("transfer_groom", on_other_mesh, {"target": "nope"}),
     ("transfer_groom", on_other_mesh, {"target": "Other", "method": "LANDMARKS"}),
     ("apply_groom", on_library, {"filepath": "library/Groom.asset.blend", "name": "nope"}),

@@ -239,6 +239,7 @@ def _state_of(owner):
             "vertex_groups": [name_of(group) for group in owner.vertex_groups],
             "modifiers": {name_of(m): (m.show_viewport, m.show_render) for m in owner.modifiers},
             "active_group": owner.vertex_groups.active_index,
+            "hidden": (_is_hidden(owner), owner.hide_render),
         }
     state: dict[str, Any] = {
         "attributes": {name_of(one) for one in owner.attributes},
@@ -255,6 +256,16 @@ def _state_of(owner):
     }
 
 
+def _is_hidden(one):
+    """Whether an object is hidden by its eye in the view layer."""
+    return _is_in_layer(one) and one.hide_get()
+
+
+def _is_in_layer(one):
+    layer = bpy.context.view_layer
+    return layer is not None and layer.objects.get(one.name) == one
+
+
 def _restore(owner, state):
     """Remove new parts of a datablock. Unchanged values are not written, so that nothing is evaluated again."""
     if isinstance(owner, Object):
@@ -267,6 +278,10 @@ def _restore(owner, state):
                 modifier.show_viewport, modifier.show_render = shown
         if owner.vertex_groups.active_index != state["active_group"]:
             owner.vertex_groups.active_index = state["active_group"]
+        if (_is_hidden(owner), owner.hide_render) != state["hidden"]:
+            hidden, owner.hide_render = state["hidden"]
+            if _is_in_layer(owner):
+                owner.hide_set(hidden)
         return
     for name in [name_of(one) for one in owner.attributes if name_of(one) not in state["attributes"]]:
         owner.attributes.remove(owner.attributes[name])

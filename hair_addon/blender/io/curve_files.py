@@ -12,11 +12,9 @@ from ...core.errors import HairError, cause_of
 from ...core.files import alembic, array_grooms, curve_file, curve_units
 from ...core.files.curve_file import Convention, Motion
 from ...core.files.strands import counted_points, hair, obj_lines, ply_strands, tressfx
-from ...core.geometry.mesh import TriMesh
 from ...core.geometry.strands import curve_offsets
-from ..data import scene
 from ..host import scene_time
-from . import curve_objects, strand_arrays
+from . import curve_objects
 from .usd import usd_curves
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
@@ -173,7 +171,8 @@ def made_of(path, file, wanted, surface_object):
     """Create the `Found` of a `CurveFile` in the open scene. Raises `HairError`."""
     path = Path(path)
     chosen, guides = _chosen_sets(path, file.sets, wanted)
-    reading = curve_units.choose(file, [*chosen, *guides], wanted.convention, _mesh(surface_object), str(path))
+    surface = curve_objects.world_mesh(surface_object)
+    reading = curve_units.choose(file, [*chosen, *guides], wanted.convention, surface, str(path))
     notes = [*file.notes, *reading.notes, *_notes_on_groups(path, chosen)]
     curves, its_guides = ([_now(one.placed(reading.meters, reading.up)) for one in sets] for sets in (chosen, guides))
     joined, made_guides, guide_ids = curve_file.join(curves), None, None
@@ -256,13 +255,6 @@ def _notes_on_groups(path, chosen):
 
 def _listed(names):
     return ", ".join(names[:5]) + ("…" if len(names) > 5 else "")
-
-
-def _mesh(surface_object):
-    """Evaluated surface as a `TriMesh` in world space [m]."""
-    surface = scene.read_surface(surface_object, scene.present_depsgraph())
-    matrix = np.array(surface_object.matrix_world) * strand_arrays.meters_per_unit(bpy.context.scene)
-    return TriMesh((surface.posed @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32), surface.mesh.triangles)
 
 
 # ---------------------------------------------------------------------------------------------------- .blend files

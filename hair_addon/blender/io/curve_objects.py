@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects for curves read from files, and joining of Curves objects."""
+"""Objects for curves read from files or meshes, their surfaces in the world, and joining of Curves objects."""
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ...core.geometry.affine import Affine
+from ...core.geometry.mesh import TriMesh
+from ..data import scene
 from ..data.strands import attributes, curves
 from ..groom.foreign import foreign_curves
 from . import strand_arrays
@@ -48,6 +50,13 @@ def new_object(name, placed, surface_object, guide_ids=None, groups=None):
         curves.write_guide_map(datablock, _guide_map(guide_ids, placed.guide_ids, placed.guide_weights))
     bpy.context.view_layer.update()
     return made
+
+
+def world_mesh(surface_object):
+    """Return the evaluated surface of an object as a `TriMesh` in world space [m]. Raises `HairError`."""
+    surface = scene.read_surface(surface_object, scene.present_depsgraph())
+    matrix = np.array(surface_object.matrix_world) * strand_arrays.meters_per_unit(bpy.context.scene)
+    return TriMesh((surface.posed @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32), surface.mesh.triangles)
 
 
 def _without_shear(matrix):

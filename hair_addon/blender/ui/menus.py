@@ -94,6 +94,7 @@ class VELLUS_MT_hair(bpy.types.Menu):
             layout.operator("vellus.add_hair", icon="OUTLINER_OB_CURVES")
             if particle_hair.systems_of(context.object):
                 layout.operator("vellus.convert_particles", icon="PARTICLES")
+            layout.operator("vellus.mesh_to_hair", icon="MESH_PLANE")
         layout.operator("vellus.distribute_guides")
         if guides_of(context.object) is not None:
             layout.operator("vellus.interpolate_hair")

@@ -61,11 +61,14 @@ def reversal(counts: np.ndarray, is_reversed: np.ndarray) -> np.ndarray:
     return np.repeat(starts, counts) + np.where(np.repeat(is_reversed, counts), backwards, place)
 
 
-def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) -> RootedCurves:
+def root(
+    mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1, is_directed: bool = False
+) -> RootedCurves:
     """Return the `RootedCurves` of points (N, 3) [m], concatenated over curves, on a `TriMesh`.
 
-    starts (C+1,): of each curve, the last entry is N; every: keep every n-th of the usable curves. Raises `HairError`
-    if the mesh cannot carry hair, no curve is usable, or the median distance of roots exceeds the mesh's size.
+    starts (C+1,): of each curve, the last entry is N; every: keep every n-th of the usable curves; is_directed:
+    curves run from root to tip, even where the tip is nearer to the mesh. Raises `HairError` if the mesh cannot carry
+    hair, no curve is usable, or the median distance of roots exceeds the mesh's size.
     """
     check_mesh(mesh)
     every = checked_every(every)
@@ -82,7 +85,9 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     found = geometry.closest_point.SurfaceQuery(mesh).nearest(ends)
     distances = np.linalg.norm(positions(mesh, found) - ends, axis=1)
     at_first, at_last = distances[: len(kept)], distances[len(kept) :]
-    is_reversed = _run_backwards(at_first, at_last, _sizes(points, starts)[kept])
+    is_reversed = np.zeros(len(kept), bool)
+    if not is_directed:
+        is_reversed = _run_backwards(at_first, at_last, _sizes(points, starts)[kept])
     chosen = np.arange(len(kept)) + np.where(is_reversed, len(kept), 0)
     distances = distances[chosen]
     size = float(np.ptp(mesh.vertices, axis=0).max())

@@ -160,7 +160,7 @@ def _sampled(key, node, uvs):
         pixels = np.empty((height, width, image.channels), np.float32)
         image.pixels.foreach_get(pixels.ravel())
         colors = pixels[..., :3] if image.channels > 2 else np.repeat(pixels[..., :1], 3, axis=2)
-        at_roots = _look_up(colors, uvs, node.extension, node.interpolation == "Closest")
+        at_roots = look_up(colors, uvs, node.extension, node.interpolation == "Closest")
         if not image.is_float and image.colorspace_settings.name == "sRGB":
             at_roots = _linear(at_roots)
         known = sample_cache.keep(key, _Sampled(uvs, at_roots))
@@ -173,14 +173,14 @@ _FOLD = {
 }
 
 
-def _look_up(pixels, uvs, extension, is_closest):
-    """Return (S, 3) colors of (H, W, 3) pixels at UVs (S, 2), between four texels, or of the closest."""
+def look_up(pixels, uvs, extension, is_closest):
+    """Return (S, C) values of (H, W, C) pixels at UVs (S, 2), between four texels, or of the closest."""
     size = np.array(pixels.shape[1::-1])
     uvs = np.where(np.isfinite(uvs) & (np.abs(uvs) < 1e6), uvs, 0.0).astype(np.float64)
     place = uvs * size - (0.0 if is_closest else 0.5)
     first = np.floor(place).astype(np.int64)
     share = np.zeros_like(place) if is_closest else place - first
-    found = np.zeros((len(uvs), 3))
+    found = np.zeros((len(uvs), pixels.shape[2]))
     fold = _FOLD.get(extension, lambda texel, count: np.clip(texel, 0, count - 1))
     for column in (0, 1):
         for row in (0, 1):

@@ -181,14 +181,19 @@ def require_usable(curves_object: Object, surface_object: Object) -> None:
         ancestor = ancestor.parent
 
 
-def on_surface(surface: Surface, seen: SeenCurves, to_surface: Affine, every: int = 1) -> PlacedCurves:
-    """Return `PlacedCurves`; to_surface: from the curves' coordinates to those of the surface."""
+def on_surface(
+    surface: Surface, seen: SeenCurves, to_surface: Affine, every: int = 1, is_directed: bool = False
+) -> PlacedCurves:
+    """Return `PlacedCurves`; to_surface: from the curves' coordinates to those of the surface.
+
+    every, is_directed: as of `rooted_curves.root`.
+    """
     points = to_surface.points(seen.points)
     mesh = surface.mesh
     if surface.is_deformed:
         mesh = TriMesh(surface.from_local(surface.posed), mesh.triangles)
     with np.errstate(invalid="ignore", over="ignore"):
-        rooted = grooming.rooted_curves.root(mesh, surface.from_local(points), seen.starts, every)
+        rooted = grooming.rooted_curves.root(mesh, surface.from_local(points), seen.starts, every, is_directed)
     points = points[rooted.point_order(seen.starts)]
     counts = np.diff(seen.starts)[rooted.kept]
     if surface.is_deformed:

@@ -61,12 +61,14 @@ def using_as_hair(
     applies_modifiers: bool = True,
     follows_guides: bool = False,
     guides_object: Object | None = None,
+    is_directed: bool = False,
 ) -> Work[KeptHair]:
     """Convert an object's curves to hair and derive guides, as work in steps; returns `KeptHair`.
 
     applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands from the guides,
     on the same roots; guides_object: of guides that came with the hair, used with their stored weights instead of
-    derived guides. Raises `HairError` before anything changes.
+    derived guides; is_directed: curves run from root to tip, even where the tip is nearer to the surface. Raises
+    `HairError` before anything changes.
     """
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
@@ -83,7 +85,7 @@ def using_as_hair(
 
     def compute(progress):
         progress("Rooting strands", 0.0)
-        placed = hand_made_guides.on_surface(surface, seen, to_surface)
+        placed = hand_made_guides.on_surface(surface, seen, to_surface, is_directed=is_directed)
         count = len(placed.counts)
         if given is not None:
             guides = hand_made_guides.on_surface(surface, *given)

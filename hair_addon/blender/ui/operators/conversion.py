@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ....core.cards.mesh_strand_settings import MeshStrandSettings
 from ....core.errors import HairError
 from ....core.files.curve_file import ENDINGS, UNITS, Convention
 from ....core.grooming import cost
@@ -16,7 +17,7 @@ from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Stage, no_progress, run_now
 from ... import io
 from ...data import scene
-from ...groom.foreign import hand_made_guides, joined_curves, kept_hair, particle_hair
+from ...groom.foreign import foreign_meshes, hand_made_guides, joined_curves, kept_hair, particle_hair
 from ...groom.foreign.foreign_curves import chosen, is_foreign, require_foreign
 from ...groom.selection import guides_of, hair_of, make_active, object_of, surface_of
 from ...groom.transfer import groom_transfers
@@ -325,6 +326,61 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
         return "{guide_count} guides, {strand_count} strands", counts
 
 
+class VELLUS_OT_mesh_to_hair(LongOperator, bpy.types.Operator):
+    """Turn the active mesh of hair cards, tubes or solid locks into hair on the other selected mesh"""
+
+    bl_idname = "vellus.mesh_to_hair"
+    bl_label = "Mesh to Hair"
+    __annotations__ = {
+        "surface": properties.mesh_name(
+            "Surface", "Mesh that the hair grows on. Leave empty to use the other selected mesh, or the parent"
+        ),
+        **setting_properties.annotations(MeshStrandSettings),
+        **setting_properties.annotations(DerivationSettings),
+        "hides_mesh": properties.switch("Hide Mesh", "Hide the mesh of cards in viewports and renders", True),
+    }
+
+    @classmethod
+    def applies(cls, context):
+        cls.poll_message_set("Select the mesh that hair grows on, then the mesh of cards or tubes, in Object Mode.")
+        active = context.object
+        is_mesh = active is not None and active.type == "MESH"
+        return context.mode == "OBJECT" and (is_mesh or cls.may_be_redone(context))
+
+    def draw(self, context):
+        setting_rows.search_row(self.layout, self.properties, "surface", bpy.data, "objects")
+        for name in ("strand_count", "root_end", "reaches_surface", "uses_alpha", "fills", "seed"):
+            setting_rows.row(self.layout, self.properties, name)
+        for name in ("guide_count", "hides_mesh"):
+            setting_rows.row(self.layout, self.properties, name)
+
+    def seconds(self, context):
+        return 1.0  # takes noticeable time for any hair
+
+    def work(self, context):
+        layer, selected = context.view_layer, context.selected_objects
+        surface = foreign_meshes.find_surface(context.object, layer, selected, self.surface)
+        return io.mesh_hair.using_mesh(
+            context.object,
+            surface,
+            context.evaluated_depsgraph_get(),
+            setting_properties.given_settings(self, MeshStrandSettings),
+            setting_properties.given_settings(self, DerivationSettings),
+            hides_mesh=self.hides_mesh,
+        )
+
+    def message(self, made):
+        counts = {"strand_count": len(made.hair.curves), "piece_count": made.piece_count}
+        return "{strand_count} strands of {piece_count} cards, tubes and locks", counts
+
+    def after(self, context, made):
+        shown = object_of(made.hair, context.view_layer)
+        if shown is not None:
+            make_active(shown, context.view_layer)
+        for sentence, values in made.notes():
+            self.report({"WARNING"}, report_text(sentence, **values))
+
+
 class VELLUS_OT_transfer_groom(LongOperator, bpy.types.Operator):
     """Copy the active hair system to the other selected mesh, with guides, settings, styles and look"""
 
@@ -396,5 +452,6 @@ CLASSES = (
     VELLUS_OT_use_as_hair,
     VELLUS_OT_import_groom,
     VELLUS_OT_convert_particles,
+    VELLUS_OT_mesh_to_hair,
     VELLUS_OT_transfer_groom,
 )

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...groom.foreign import particle_hair
+from ...groom.foreign import foreign_meshes, particle_hair
 from ...groom.foreign.foreign_curves import chosen, is_foreign
 from ...groom.guides import line_drawing
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
@@ -49,6 +49,9 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
                 box.operator(warning.operator)
         if particle_hair.systems_of(context.object):
             layout.operator("vellus.convert_particles", icon="PARTICLES")
+        if foreign_meshes.is_hair_mesh_chosen(context.object, context.selected_objects):
+            write(layout, context, interface_text("Cards, tubes and locks can become hair on the other mesh."), "INFO")
+            layout.operator("vellus.mesh_to_hair", icon="MESH_PLANE")
         if parts:
             _draw_tools(layout, context)
             _draw_combing_settings(layout, context)

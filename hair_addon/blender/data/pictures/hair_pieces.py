@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes of hair cards, tubes and locks as arrays, with the colors and the alpha of their materials."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.geometry.mesh import SurfacePoints
+from ....core.maps import pixels
+from ...host.notices import name_of
+from .. import scene
+from ..maps import image_pixels
+from . import root_colors
+
+_SHADERS = {"BSDF_PRINCIPLED": "Base Color", "BSDF_DIFFUSE": "Color", "BSDF_HAIR_PRINCIPLED": "Color"}
+
+
+@dataclass(frozen=True)
+class _Material:
+    """Color, a linear RGBA, and alpha of a material; images replace them.
+
+    color_image: `Image`; alpha_image: `Image`, whose alpha is read if is_alpha, else its colors.
+    """
+
+    color: np.ndarray | None = None
+    color_image: Any = None
+    alpha: float = 1.0
+    alpha_image: Any = None
+    is_alpha: bool = True
+
+
+@dataclass(frozen=True)
+class HairPieces:
+    """An evaluated mesh of hair in the local coordinates of its object.
+
+    vertices (V, 3) float32; triangles (F, 3) int32; corner_uvs: (F, 3, 2), None without a UV map; corner_colors:
+    (F, 3, 4) linear, None without a color attribute; materials: `_Material` of each slot; slots: (F,).
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    corner_uvs: np.ndarray | None
+    corner_colors: np.ndarray | None
+    materials: list[_Material]
+    slots: np.ndarray
+
+    @property
+    def has_colors(self) -> bool:
+        """Whether all pieces have a color."""
+        used = [self.materials[slot] for slot in np.unique(self.slots)]
+        has_uvs = self.corner_uvs is not None
+        return all(
+            (one.color_image is not None and has_uvs) or self.corner_colors is not None or one.color is not None
+            for one in used
+        )
+
+    def colors(self, places: SurfacePoints) -> np.ndarray:
+        """Return (N, 4) float64 at places on the mesh: linear colors multiplied by alpha, and alpha."""
+        found = np.ones((len(places), 4))
+        weights, slots = places.barycentric.astype(np.float64), self.slots[places.triangle]
+        uvs = None
+        if self.corner_uvs is not None:
+            uvs = np.einsum("nc,ncu->nu", weights, self.corner_uvs[places.triangle])
+        for slot in np.unique(slots):
+            rows, material = np.flatnonzero(slots == slot), self.materials[slot]
+            color, alpha = np.ones((len(rows), 3)), np.full(len(rows), material.alpha)
+            if uvs is not None and material.alpha_image is not None:
+                alpha *= _alpha(material, uvs[rows])
+            if uvs is not None and material.color_image is not None:
+                sampled = _sampled(image_pixels.read(material.color_image, True), uvs[rows])
+                color = pixels.unpremultiplied(sampled)[0]
+            elif self.corner_colors is not None:
+                corners = self.corner_colors[places.triangle[rows], :, :3]
+                color = np.einsum("nc,ncv->nv", weights[rows], corners)
+            elif material.color is not None:
+                color[:] = material.color[:3]
+            found[rows, :3], found[rows, 3] = color * alpha[:, None], alpha
+        return found
+
+
+def _alpha(material, uvs):
+    if material.is_alpha:
+        return _sampled(image_pixels.read(material.alpha_image, True), uvs)[:, 3]
+    return _sampled(image_pixels.read(material.alpha_image, False), uvs)[:, 0]
+
+
+def _sampled(tiles, uvs):
+    """Return (N, C) float64 of {UDIM tile, or None: (H, W, C) pixels} at UVs (N, 2); zero where there is no tile."""
+    uvs = np.where(np.isfinite(uvs) & (np.abs(uvs) < 1e6), uvs, 0.0)
+    if None in tiles:
+        # The ends of cards that fill a texture must not mix with its opposite side.
+        is_inside = ((uvs >= 0.0) & (uvs <= 1.0)).all()
+        return root_colors.look_up(tiles[None], uvs, "EXTEND" if is_inside else "REPEAT", False).astype(np.float64)
+    cells = np.floor(uvs).astype(np.int64)
+    numbers = 1001 + cells[:, 0] + 10 * cells[:, 1]
+    found = np.zeros((len(uvs), next(iter(tiles.values())).shape[2]))
+    for tile, values in tiles.items():
+        rows = np.flatnonzero(numbers == tile)
+        found[rows] = root_colors.look_up(values, uvs[rows] - cells[rows], "EXTEND", False)
+    return found
+
+
+def read(mesh_object, depsgraph) -> HairPieces:
+    """Return the `HairPieces` of the evaluated mesh of an object. Raises `HairError`."""
+    evaluated = mesh_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if not len(mesh.polygons):
+            raise HairError('"{name}" has no faces: pick a mesh of cards, tubes or locks.', name=name_of(mesh_object))
+        faces = scene.faces_of(mesh)
+        corners = scene.triangle_corners(mesh, faces, name_of(mesh_object))
+        slots = np.zeros(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("material_index", slots)
+        polygons = np.searchsorted(faces.starts, corners[:, 0], side="right") - 1
+        materials = [_read_material(slot.material) for slot in evaluated.material_slots] or [_Material()]
+        return HairPieces(
+            scene.vertex_positions(mesh),
+            faces.corner_vertices[corners],
+            _corner_uvs(mesh, corners),
+            _corner_colors(mesh, faces, corners),
+            materials,
+            np.clip(slots[polygons], 0, len(materials) - 1),
+        )
+    finally:
+        evaluated.to_mesh_clear()
+
+
+def _corner_uvs(mesh, corners):
+    layer = mesh.uv_layers.active
+    if layer is None or len(layer.uv) != len(mesh.loops):
+        return None
+    uvs = np.empty((len(mesh.loops), 2), np.float32)
+    layer.uv.foreach_get("vector", uvs.ravel())
+    return np.where(np.isfinite(uvs), uvs, np.float32(0.0))[corners]
+
+
+def _corner_colors(mesh, faces, corners):
+    layer = mesh.color_attributes.active_color
+    if layer is None or layer.domain not in {"POINT", "CORNER"}:
+        return None
+    colors = np.empty((len(layer.data), 4), np.float32)
+    layer.data.foreach_get("color", colors.ravel())
+    found = colors[faces.corner_vertices[corners] if layer.domain == "POINT" else corners]
+    return np.maximum(np.where(np.isfinite(found), found, np.float32(0.0)), 0.0)
+
+
+def _read_material(material):
+    """Return the `_Material` of a Blender material, by its first shader of `_SHADERS`."""
+    if material is None:
+        return _Material()
+    shaders = [] if material.node_tree is None else [n for n in material.node_tree.nodes if n.type in _SHADERS]
+    if not shaders:
+        return _Material(np.array(material.diffuse_color))
+    color, alpha = shaders[0].inputs[_SHADERS[shaders[0].type]], shaders[0].inputs.get("Alpha")
+    image, _ = _image_before(color)
+    alpha_image, output = (None, "") if alpha is None else _image_before(alpha)
+    constant = 1.0 if alpha is None or alpha.is_linked else float(alpha.default_value)
+    return _Material(
+        None if color.is_linked else np.array(color.default_value), image, constant, alpha_image, output == "Alpha"
+    )
+
+
+def _image_before(socket):
+    """Return (`Image`, name of its output) of the first image with pixels that leads to a socket; (None, "")."""
+    waiting, known = [socket], set()
+    while waiting:
+        for link in waiting.pop(0).links:
+            node = link.from_node
+            if node.type == "TEX_IMAGE" and node.image is not None and all(node.image.size):
+                return node.image, link.from_socket.name
+            if node.name not in known:
+                known.add(node.name)
+                waiting += [one for one in node.inputs if one.is_linked]
+    return None, ""

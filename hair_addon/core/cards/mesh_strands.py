@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes of hair cards, tubes and solid locks → strands.
+
+Strands of a card run from its root end to its tip end, at even places across it. Strands of a tube or a lock are evenly
+distributed over its cross sections, on the spiral of [Vogel79].
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import HairError
+from ..geometry.closest_point import SurfaceQuery
+from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
+from ..geometry.strands import curve_offsets
+from ..long_work import Progress, no_progress, part_of
+from . import lock_sections, ribbon_charts
+from .mesh_pieces import Piece, pieces_of
+from .mesh_strand_settings import MOST_STRANDS, MeshStrandSettings
+
+_CLEAR = 0.1  # difference of two ends' distances to the surface, relative to the length, that determines the root
+_JITTER = 0.6  # of a strand's place, relative to the distance of strands across a card
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
+_OPAQUE = 0.5  # alpha above which a texture shows hair
+_LEAST_SHOWN = 0.25  # part of a strand that must be opaque
+_REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
+_TOUCHING = 1e-5  # the same, of a root on the surface
+_LAYER = 4.0  # distance between charts: places on one are never closest to another
+_MOST_FACES = 20_000  # of a piece: larger ones are bodies
+
+
+@dataclass(frozen=True)
+class MeshStrands:
+    """S strands with N points, from root to tip.
+
+    points: (N, 3) float32 [m]; counts: (S,) of points; radii: (N,) float32 [m] with which strands fill their piece;
+    places: N `SurfacePoints` on the hair mesh, for its textures; pieces: (S,) piece of each strand; piece_count: number
+    of used pieces; skipped_count: number of pieces that are neither cards nor slender, or
+    too large.
+    """
+
+    points: np.ndarray
+    counts: np.ndarray
+    radii: np.ndarray
+    places: SurfacePoints
+    pieces: np.ndarray
+    piece_count: int
+    skipped_count: int
+
+    @property
+    def starts(self) -> np.ndarray:
+        """(S+1,) offsets of each strand's points."""
+        return curve_offsets(self.counts)
+
+    def some(self, is_chosen: np.ndarray) -> "MeshStrands":
+        """Return the strands with the chosen points; strands with fewer than two are left out; is_chosen: (N,) bool."""
+        left = np.add.reduceat(is_chosen.astype(np.int64), self.starts[:-1])
+        rows = is_chosen & np.repeat(left >= 2, self.counts)
+        return replace(
+            self,
+            points=self.points[rows],
+            counts=left[left >= 2],
+            radii=self.radii[rows],
+            places=self.places[rows],
+            pieces=self.pieces[left >= 2],
+        )
+
+
+def mesh_strands(
+    mesh: TriMesh,
+    surface: TriMesh,
+    settings: MeshStrandSettings,
+    corner_uvs: np.ndarray | None = None,
+    progress: Progress = no_progress,
+) -> MeshStrands:
+    """Return the strands of a hair mesh, both in the same coordinates [m].
+
+    corner_uvs: (F, 3, 2) of triangles' corners, None without a UV map. Raises `HairError`.
+    """
+    if settings.root_end != "SURFACE" and corner_uvs is None:
+        raise HairError("The hair mesh has no UV map: choose its roots by the surface.")
+    progress("Finding cards", 0.0)
+    pieces = pieces_of(mesh)
+    counts = _shares(mesh, pieces, settings.strand_count)
+    maker = _Maker(mesh, surface, settings, corner_uvs)
+    for place, (piece, count) in enumerate(zip(pieces, counts.tolist(), strict=True)):
+        if place % 256 == 0:
+            part_of(progress, 0.1, 0.8)("Following cards", place / len(pieces))
+        maker.add(piece, count)
+    progress("Placing strands", 0.8)
+    return maker.strands()
+
+
+def _shares(mesh, pieces, count):
+    """Return the number of strands (P,) of each piece: one, and a share of the others by area."""
+    areas = np.add.reduceat(
+        mesh.areas[np.concatenate([piece.faces for piece in pieces])],
+        np.cumsum([0] + [len(piece.faces) for piece in pieces[:-1]]),
+    )
+    more = max(count - len(pieces), 0)
+    ends = np.round(np.cumsum(areas) / max(areas.sum(), 1e-300) * more).astype(np.int64)
+    return 1 + np.diff(ends, prepend=0)
+
+
+class _Maker:
+    """Strands of the pieces of a mesh, which are added in turn."""
+
+    def __init__(self, mesh, surface, settings, corner_uvs):
+        self._mesh, self._settings, self._uvs = mesh, settings, corner_uvs
+        self._away = _distances(surface, mesh.vertices)
+        self._vertices = mesh.vertices.astype(np.float64)
+        self._random = np.random.default_rng(settings.seed)
+        self._charts = ribbon_charts.Charts()
+        self._flat, self._faces, self._queries = [], [], []  # of cards
+        self._parts = []  # of pieces: (is a card, strand count, station count, radii (K,), points, vertices' corners)
+        self._skipped = 0
+
+    def add(self, piece: Piece, count: int) -> None:
+        """Add the strands of a piece, or count it as skipped."""
+        topology, points = piece.topology, self._vertices[piece.vertices]
+        if len(piece.faces) > _MOST_FACES or not topology.is_simple or not np.ptp(points, axis=0).max() > 0.0:
+            self._skipped += 1
+        elif topology.euler_characteristic == 1 and not _is_closed_at_tip(topology, points):
+            self._add_card(piece, points, count)
+        else:
+            self._add_lock(piece, points, count)
+
+    def strands(self) -> MeshStrands:
+        """Return the strands of all pieces. Raises `HairError` if there are none."""
+        if not self._parts:
+            raise HairError(
+                "The hair mesh has no cards, tubes or slender locks of at most {most} triangles: pick a mesh of them.",
+                most=_MOST_FACES,
+            )
+        total = sum(part[1] for part in self._parts)
+        if total > MOST_STRANDS:
+            raise HairError("{count} strands exceed {most}: use fewer strands.", count=total, most=MOST_STRANDS)
+        points, faces, barycentric = self._on_charts()
+        found: list[tuple] = []
+        used = 0
+        for is_card, count, stations, radii, own, corners in self._parts:
+            size = count * stations
+            if is_card:
+                rows = slice(used, used + size)
+                found.append((points[rows], faces[rows], barycentric[rows], np.tile(radii, count)))
+                used += size
+            else:
+                found.append((own, corners // 3, np.eye(3, dtype=np.float32)[corners % 3], np.tile(radii, count)))
+        merged = [np.concatenate(rows) for rows in zip(*found, strict=True)]
+        counts = np.array([part[1] for part in self._parts])
+        return MeshStrands(
+            merged[0].astype(np.float32),
+            np.repeat([part[2] for part in self._parts], counts),
+            merged[3].astype(np.float32),
+            SurfacePoints(merged[1].astype(np.int32), merged[2].astype(np.float32)),
+            np.repeat(np.arange(len(counts)), counts).astype(np.int32),
+            len(self._parts),
+            self._skipped,
+        )
+
+    def _add_card(self, piece, points, count):
+        uvs = self._piece_uvs(piece)
+        away = self._away[piece.vertices]
+        chart, widths = self._charts.chart(piece.topology, points, uvs, away, self._root_first(away, uvs))
+        across = (np.arange(count) + 0.5) / count
+        if count > 1:
+            across += (self._random.random(count) - 0.5) * (_JITTER / count)
+        queries = np.empty((count, len(chart.stations), 3))
+        queries[..., 0] = chart.left + across[:, None] * (chart.right - chart.left)
+        queries[..., 1], queries[..., 2] = chart.stations, _LAYER * len(self._flat)
+        self._queries.append(queries)
+        self._flat.append(chart.places[piece.topology.triangles])
+        self._faces.append(piece.faces)
+        self._parts.append((True, count, len(chart.stations), widths / (2.0 * count), None, None))
+
+    def _add_lock(self, piece, points, count):
+        uvs = self._piece_uvs(piece)
+        sections = lock_sections.sections_of(piece.topology, points, self._root_first(self._away[piece.vertices], uvs))
+        if sections is None:
+            self._skipped += 1
+            return
+        turn = self._random.random() * 2.0 * np.pi
+        order = np.arange(count)
+        found, vertices = sections.places(np.stack([turn + order * _GOLDEN, np.sqrt(order / count)], axis=1))
+        corners = np.empty(len(piece.vertices), np.int64)
+        triangle, corner = np.nonzero(piece.first_corners)
+        corners[piece.topology.triangles[triangle, corner]] = 3 * piece.faces[triangle] + corner
+        radii = sections.radii.mean(axis=1) / np.sqrt(count)
+        stations = found.shape[1]
+        self._parts.append((False, count, stations, radii, found.reshape(-1, 3), corners[vertices].ravel()))
+
+    def _piece_uvs(self, piece):
+        """Return UV coordinates (v, 2) of a piece's vertices, or None."""
+        if self._uvs is None:
+            return None
+        found = np.empty((len(piece.vertices), 2))
+        triangle, corner = np.nonzero(piece.first_corners)
+        found[piece.topology.triangles[triangle, corner]] = self._uvs[piece.faces[triangle], corner]
+        return found
+
+    def _root_first(self, away, uvs):
+        """Return the function of two ends and a length that decides which end is the root."""
+        root_end = self._settings.root_end
+
+        def is_first(first, second, length):
+            if root_end != "SURFACE":
+                low, high = uvs[first, 1].mean(), uvs[second, 1].mean()
+                return None if low == high else bool((low < high) == (root_end == "LOW_V"))
+            near, far = away[first].mean(), away[second].mean()
+            return bool(near < far) if abs(near - far) > _CLEAR * length else None
+
+        return is_first
+
+    def _on_charts(self):
+        """Return (points (Q, 3), faces (Q,), barycentric (Q, 3)) of the queries on all charts."""
+        if not self._flat:
+            return np.zeros((0, 3)), np.zeros(0, int), np.zeros((0, 3))
+        faces = np.concatenate(self._faces)
+        layers = np.repeat(_LAYER * np.arange(len(self._flat)), [len(chart) for chart in self._flat])
+        flat = np.concatenate(
+            [np.concatenate(self._flat), np.broadcast_to(layers[:, None, None], (len(faces), 3, 1))], 2
+        )
+        layout = TriMesh(
+            flat.reshape(-1, 3).astype(np.float32), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3)
+        )
+        queries = np.concatenate([query.reshape(-1, 3) for query in self._queries]).astype(np.float32)
+        found = SurfaceQuery(layout).nearest(queries)
+        on_mesh = faces[found.triangle]
+        weights = found.barycentric.astype(np.float64)
+        corners = self._vertices[self._mesh.triangles[on_mesh]]
+        return np.einsum("qc,qci->qi", weights, corners), on_mesh, weights
+
+
+def _is_closed_at_tip(topology, points):
+    """Whether a piece with one boundary is a tube with a closed tip instead of a card."""
+    if len(topology.loops) != 1:
+        return True
+    loop = points[topology.loops[0]]
+    if len(loop) == len(points):  # the boundary has all vertices
+        return False
+    length = np.linalg.norm(np.diff(loop, axis=0, append=loop[:1]), axis=1).sum()
+    return np.linalg.norm(points - loop.mean(axis=0), axis=1).max() > 0.5 * length
+
+
+def _distances(surface, points):
+    """Return distances (N,) [m] of points to a surface."""
+    near = positions(surface, SurfaceQuery(surface).nearest(points))
+    return np.linalg.norm(points.astype(np.float64) - near, axis=1)
+
+
+def shown(strands: MeshStrands, alpha: np.ndarray) -> MeshStrands:
+    """Return strands that end where a texture becomes transparent, without those that it hides.
+
+    alpha: (N,) in [0, 1] at the points. Raises `HairError` if no strand is left.
+    """
+    is_shown, starts = alpha >= _OPAQUE, strands.starts[:-1]
+    place = np.arange(len(alpha)) - np.repeat(starts, strands.counts)
+    last = np.maximum.reduceat(np.where(is_shown, place, -1), starts)
+    parts = np.add.reduceat(is_shown.astype(np.float64), starts) / strands.counts
+    last[parts < _LEAST_SHOWN] = -1
+    found = strands.some(place <= np.repeat(last, strands.counts))
+    if not len(found.counts):
+        raise HairError("The texture of the hair mesh is transparent at all strands: turn off Use Alpha.")
+    return found
+
+
+def on_surface(strands: MeshStrands, surface: TriMesh) -> MeshStrands:
+    """Return strands that begin on a surface [m]: cut where they leave it, or extended from the closest point.
+
+    Strands that begin far from it, or stay inside, do not change.
+    """
+    query, starts = SurfaceQuery(surface), strands.starts
+    points = strands.points.astype(np.float64)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    steps[starts[1:-1] - 1] = 0.0
+    lengths = np.add.reduceat(np.append(steps, 0.0), starts[:-1])
+    heights = _heights(query, surface, points)
+    place = np.arange(len(points)) - np.repeat(starts[:-1], strands.counts)
+    is_out = (heights > 0.0) & (place <= np.repeat(strands.counts // 2, strands.counts))
+    first = np.minimum.reduceat(np.where(is_out, place, len(points)), starts[:-1])
+    is_cut = (first > 0) & (first < len(points))
+    at = starts[:-1] + np.where(is_cut, first, 0)
+    before = at - is_cut
+    share = np.where(is_cut, heights[before] / np.where(is_cut, heights[before] - heights[at], 1.0), 0.0)[:, None]
+    leaving = points[before] + share * (points[at] - points[before])
+    roots = positions(surface, query.nearest(leaving)).astype(np.float64)
+    apart = np.linalg.norm(roots - points[at], axis=1)
+    is_outside = first < len(points)
+    is_extended = is_outside & (apart > _TOUCHING * lengths)
+    is_extended &= (np.linalg.norm(roots - leaving, axis=1) <= _REACH * lengths) & (lengths > 0.0)
+    # A cut strand gives the place of its last point inside to the root; others get a new first point.
+    is_new = is_extended & ~is_cut
+    keeps = place >= np.repeat(np.where(is_cut & is_extended, first - 1, 0), strands.counts)
+    moved = strands.points.copy()
+    moved[before[is_extended & is_cut]] = roots[is_extended & is_cut]
+    kept = replace(strands, points=moved)
+    if not keeps.all():
+        kept = kept.some(keeps)
+    order = np.repeat(np.arange(len(kept.points)), 1 + _firsts(kept, is_new))
+    grown = replace(
+        kept,
+        points=kept.points[order],
+        counts=kept.counts + is_new,
+        radii=kept.radii[order],
+        places=kept.places[order],
+    )
+    grown.points[grown.starts[:-1][is_new]] = roots[is_new]
+    return grown
+
+
+def _firsts(strands, is_chosen):
+    found = np.zeros(len(strands.points), int)
+    found[strands.starts[:-1][is_chosen]] = 1
+    return found
+
+
+def _heights(query, surface, points):
+    """Return heights (N,) [m] above a surface, negative inside."""
+    near = query.nearest(points)
+    return np.einsum("ni,ni->n", points - positions(surface, near), normals(surface, near))
+
+
+def root_to_tip_means(strands: MeshStrands, values: np.ndarray) -> np.ndarray:
+    """Return means (S, C) of values (N, C) over the points of each strand."""
+    return np.add.reduceat(values, strands.starts[:-1], axis=0) / strands.counts[:, None]
