@@ -78,6 +78,8 @@ def run(given, console):
     for one, made in zip(guides, run_now(baking, console.progress), strict=True):
         if made.worst.count:
             console.warn(str(made.worst.message_of(one)))
+        if made.status:
+            console.warn(made.status)
     if given.deliver is not None:
         _deliver(given, guides, scene, console)
 

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import HairError
-from ..data.simulation import frame_animation
+from ..data import scene
+from ..data.simulation import frame_animation, varied_dynamics
 from ..data.surfaces import cage_of
 from ..groom import staleness
 from ..groom.dynamics import frame_folders, guide_baking
@@ -33,6 +34,7 @@ class _State:
 state_cache = Cache()  # session_uid of guide Curves → _State
 # session_uid of guide Curves → (FrameCache, {frame: the part of the animation that changed since the bake})
 change_cache = Cache()
+map_status_cache = Cache()  # session_uid of guide Curves → sentence about a missing source of their maps
 
 
 def state_of(guides):
@@ -53,6 +55,21 @@ def note(guides, blender_scene, played):
     else:
         marks, status = (), _unknown() if played is None else _of_played(played, scene_time.frame_of(blender_scene))
     state_cache.keep(guides.session_uid, _State(marks, *status))
+
+
+def maps_changed(guides):
+    """Note that maps of guides, or their sources, may have changed: `note` and `map_status_of` read them again."""
+    for cache in (state_cache, map_status_cache):
+        cache.invalidate(guides.session_uid)
+
+
+def map_status_of(guides):
+    """Return a sentence about a missing source of the maps of guides, whose settings have their values. Raises
+    `HairError` for an invalid surface.
+    """
+    return map_status_cache.get(
+        guides.session_uid, lambda: varied_dynamics.present(guides, scene.last_depsgraph()).status
+    )
 
 
 def note_combed(guides, blender_scene, played):

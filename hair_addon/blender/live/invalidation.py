@@ -62,6 +62,7 @@ COPIES = (
     moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,
     image_pixels.pixel_cache,
+    dynamics_state.map_status_cache,
 )
 
 # Values that are keyed by all of their inputs, or check by themselves whether they are up to date.

@@ -76,7 +76,7 @@ def _update_status(guides, blender_scene, points, time):
             raise fault
         is_known = frame_folders.has_frames(guides) or played_cache.get(guides.session_uid) is not None
         if points is not None or is_known:
-            guides.vellus.dynamics_status = ""
+            guides.vellus.dynamics_status = dynamics_state.map_status_of(guides)
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
 
@@ -131,12 +131,16 @@ def _known(guides, blender_scene):
 
 
 def _note_change(guides, blender_scene, depsgraph):
+    dynamics_state.maps_changed(guides)
+    played = played_cache.get(guides.session_uid)
+    if played is not None:
+        played.simulated.masks.clear()  # to be read again
     try:
         if frame_folders.is_simulated(guides):
             _follow_known(guides, blender_scene, depsgraph)
             _write_again(guides)
         _note_state(guides, blender_scene)
-        guides.vellus.dynamics_status = ""
+        guides.vellus.dynamics_status = dynamics_state.map_status_of(guides)
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
 
@@ -250,6 +254,8 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     if played.simulated.follow_parting(guides, depsgraph):
         played.outdated = played.frame
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings, played.simulated.masks)
+    if not read.varied.is_same(played.simulated.varied):
+        played.outdated = played.frame
     points = played.simulated.advance(read)
     played.frame += 1
     played.worst = max(played.worst, Broken(len(played.simulated.simulation.broken), played.frame))

@@ -9,6 +9,7 @@ origin near the hair. The origin follows the hair in steps that are exact in sin
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 import warp as wp
@@ -25,8 +26,8 @@ from .hair_volume import LEAST_CELL, HairVolume
 from .rod import detail, rotations, sag_free
 from .rod.material import material_of
 from .rod.rod_solver import Surroundings, to_lanes
-from .rod.rods import Rods, combed_shape, step_of
-from .rod.settings import DynamicsSettings
+from .rod.rods import Rods, combed_shape, pinned_count, step_of
+from .rod.settings import VARIED, DynamicsSettings
 from .root_motion import RigidMotion, RootPose
 
 MOST_SUBSTEPS = 64
@@ -35,6 +36,7 @@ _SHORTEST_WAY = 0.003  # least value of the reduced limit [m]: smaller values do
 _GRID = 0.125  # spacing of possible origins [m]
 _LEAST_RUBBING = 0.01 - 1e-9  # least interval between evaluations of the hair volume [s]
 _ASKED = 256  # sampled guides for the mean distance
+_NOTHING: Mapping[str, np.ndarray] = MappingProxyType({})
 _MOST_RESETS = 10  # number of consecutive frames with breakage after which a strand stays in its groom
 
 
@@ -83,15 +85,15 @@ class Simulation:
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
         held: np.ndarray | None = None,
-        stiffness: np.ndarray | None = None,
+        varied: Mapping[str, np.ndarray] = _NOTHING,
     ) -> None:
         """groom: (G, P, 3) [m], combed guides on the surface at rest; pose: of the guides' roots in the first frame.
 
         regions: (G,) integers from 0; guides of different regions do not interact; None for one region. wetness: (G,)
         of each guide in [0, 1], None for the wetness of the settings. held: (G,) in [0, 1], the fraction of each
-        guide's length, from the root, that only follows the surface, up to a tie; None for none. stiffness: (G,) bend
-        stiffness of each guide, None for that of the settings. Raises `HairError` for non-finite values or counts that
-        do not match.
+        guide's length, from the root, that only follows the surface, up to a tie; None for none. varied: {setting:
+        (G,) of each guide} of settings in `VARIED` that differ between guides. Raises `HairError` for values outside of
+        their range or counts that do not match.
         """
         self.settings, self.pose, self.world = settings, pose, world
         self.substeps = self.required_substeps = 0  # number in the last frame, and number that its motion requires
@@ -102,7 +104,7 @@ class Simulation:
         self._regions = self._checked_regions(regions)
         self._wetness = self._checked_wetness(wetness)
         self._held = np.zeros(len(groom)) if held is None else np.asarray(held, np.float64)
-        self._stiffness = self._checked_stiffness(stiffness)
+        self._varied = self._checked_varied(varied)
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
@@ -120,8 +122,17 @@ class Simulation:
         self._since_rubbed = 0.0  # [s]
 
     def _hold(self):
-        """Hold guides up to their ties, if the settings do."""
-        self._rods.hold(self._held if self.settings.holds_ties else np.zeros_like(self._held))
+        """Hold guides up to their ties, if the settings do, and let each respond by its own settings."""
+        held = self._held if self.settings.holds_ties else np.zeros_like(self._held)
+        self._rods.hold(held, self._pinned_counts())
+        self._rods.respond(self._varied.get("damping"), self._varied.get("hold"))
+
+    def _pinned_counts(self):
+        """Return the number (G,) of pinned points of each guide; None if guides do not differ."""
+        if "pinned" not in self._varied:
+            return None
+        count = self.settings.vertex_count - 1
+        return np.array([pinned_count(fraction, count) for fraction in self._varied["pinned"]])
 
     def _new_volume(self):
         """Return the `HairVolume`, with cells as large as the spacing of guides."""
@@ -150,12 +161,13 @@ class Simulation:
                 raise HairError("The wetness of guides must be from 0 to 1.")
         return wetness
 
-    def _checked_stiffness(self, stiffness):
-        if stiffness is not None:
-            require_count("stiffnesses", len(stiffness), len(self._groom))
-            if not (np.isfinite(stiffness).all() and np.min(stiffness) > 0.0):
-                raise HairError("The stiffness of guides must be positive.")
-        return stiffness
+    def _checked_varied(self, varied):
+        for name, values in varied.items():
+            require_count(f"values of {name}", len(values), len(self._groom))
+            if not (np.min(values) >= VARIED[name].low and np.max(values) <= VARIED[name].high):
+                low, high = VARIED[name].low, VARIED[name].high
+                raise HairError(f"The {name} of guides must be from {low:g} to {high:g}.")
+        return varied
 
     def _checked_regions(self, regions):
         count = len(self._groom)
@@ -170,7 +182,7 @@ class Simulation:
     def _shapes(self, vertices):
         """Return (`Material`, `RestShape`) of vertices."""
         lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
-        material = material_of(self.settings, lengths, self._wetness, self._stiffness)
+        material = material_of(self.settings, lengths, self._wetness, self._varied.get("bend_stiffness"))
         if not self.settings.sag_free:
             return material, combed_shape(vertices)
         x, y, z = (self.settings.gravity * component for component in self.world.gravity)
@@ -181,18 +193,18 @@ class Simulation:
         settings: DynamicsSettings,
         groom: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
-        stiffness: np.ndarray | None = None,
+        varied: Mapping[str, np.ndarray] = _NOTHING,
     ) -> None:
-        """Continue with other settings, wetness, stiffness and groom, with the same number of vertices.
+        """Continue with other settings, wetness and groom, with the same number of vertices.
 
-        groom: None for no change; wetness, stiffness: (G,), None for those of the settings. Raises `HairError` for
+        groom: None for no change; wetness: (G,), None for that of the settings; varied: as in `__init__`. Raises `HairError` for
         another number of vertices.
         """
-        stiffness = self._checked_stiffness(stiffness)
+        varied = self._checked_varied(varied)
         wetness = self._checked_wetness(wetness)
         if settings.vertex_count != self.settings.vertex_count:
             raise HairError("A change of the number of points requires a new simulation: play from the start.")
-        self.settings, self._wetness, self._stiffness = settings, wetness, stiffness
+        self.settings, self._wetness, self._varied = settings, wetness, varied
         if groom is not None:
             require_count("guides", len(groom), len(self._groom))
             self._groom = self._checked(groom)
@@ -239,6 +251,8 @@ class Simulation:
         self.required_substeps = self._substep_count(before, pose)
         count = self.required_substeps if self.settings.automatic_substeps else self.settings.substeps
         step = step_of(self.settings, self._material, seconds, count, world.gravity)
+        pinned = self._pinned_counts()
+        step = step if pinned is None else replace(step, pinned=int(pinned.min()))
         if self._is_free:
             self._rods.advance(step)
         elif self._colliders.is_still and not world.fields and not self._is_rubbing:

@@ -26,12 +26,22 @@ def varied_number(value: float, mask: np.ndarray, how: Combination, details: Par
 
     Infinite masks count as 0; NaN, a strand without a map, keeps the value.
     """
+    return within(value * factors(mask, how), details)
+
+
+def factors(mask: np.ndarray, how: Combination) -> np.ndarray:
+    """Return lerp(low, high, mask) (S,) float64 for masks (S,): infinite masks count as 0, NaN gives the factor 1."""
     mask = np.where(np.isinf(mask), 0.0, np.asarray(mask, float))
     if how.is_inverted:
         mask = 1.0 - mask
     factor = (1.0 - mask) * how.low + mask * how.high
+    return np.where(np.isnan(factor), 1.0, factor)
+
+
+def within(values: np.ndarray, details: Param) -> np.ndarray:
+    """Return values (S,) of a setting limited to its range."""
     least = details.low if details.above == -np.inf else max(details.low, np.nextafter(details.above, np.inf))
-    return np.clip(np.where(np.isnan(factor), value, value * factor), least, details.high)
+    return np.clip(values, least, details.high)
 
 
 def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combination, details: Param) -> np.ndarray:

@@ -20,7 +20,7 @@ from ....core.grooming import cost
 from ....core.long_work import Stage, Work
 from ...data import scene as scenes
 from ...data import surface_space
-from ...data.simulation import varied_stiffness, wet_guides
+from ...data.simulation import varied_dynamics, wet_guides
 from ...data.surfaces import cage_of
 from ...host import memory, scene_time
 from ...host.datablocks import Remembered
@@ -49,7 +49,7 @@ def is_baking() -> bool:
 class Baked:
     """Result of a bake: the number of simulated frames, and how often strands broke and were reset to the groom.
 
-    worst: of all existing frames, the one in which most broke.
+    worst: of all existing frames, the one in which most broke; status: a sentence about a missing source of a map.
     """
 
     first: int
@@ -57,6 +57,7 @@ class Baked:
     simulated: int
     broken: int
     worst: Broken
+    status: str
 
 
 @dataclass(frozen=True)
@@ -95,8 +96,8 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "units": scene.unit_settings.scale_length,
     }
     regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.last_depsgraph())
-    stiffness = varied_stiffness.unkeyed(guides, scenes.last_depsgraph())
-    found = {_PARTING: regions, "wet places": wetness, "stiffness": stiffness}
+    found = {_PARTING: regions, "wet places": wetness}
+    found |= {f"map of {name}": part for name, part in _varied(guides).factors.items()}
     return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
 
 
@@ -122,6 +123,10 @@ def _now():
 
 def _parted_by(guides):
     return frame_manifest.digest(guide_regions.parting_keys(guides))
+
+
+def _varied(guides):
+    return varied_dynamics.present(guides, scenes.last_depsgraph())
 
 
 def _regions(guides):
@@ -179,7 +184,7 @@ def baking(
                 tell(_baked_frame(task, frame))
         for task in tasks:
             task.writer.complete()
-    return [Baked(task.simulated.settings.start_frame, last, *pair) for task, pair in _results(tasks, counts)]
+    return [Baked(task.simulated.settings.start_frame, last, *result) for task, result in _results(tasks, counts)]
 
 
 def _baked_frame(task, frame):
@@ -197,7 +202,10 @@ def _note_broken(task, frame):
 
 
 def _results(tasks, counts):
-    return [(task, (count, task.broken, task.worst)) for task, count in zip(tasks, counts, strict=True)]
+    return [
+        (task, (count, task.broken, task.worst, task.simulated.varied.status))
+        for task, count in zip(tasks, counts, strict=True)
+    ]
 
 
 def _end(its_scene, present, baked):

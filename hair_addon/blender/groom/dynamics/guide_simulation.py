@@ -18,8 +18,9 @@ from ....core.files import frame_manifest
 from ....core.geometry.affine import Affine
 from ....core.params import given
 from ...data import surface_space
-from ...data.simulation import guide_poses, simulated_world, varied_stiffness, wet_guides
+from ...data.simulation import guide_poses, simulated_world, varied_dynamics, wet_guides
 from ...data.simulation.guide_poses import GuidePose
+from ...data.simulation.varied_dynamics import VariedDynamics
 from ...data.strands import curves, gathered_groups
 from ...data.surfaces import cage_of
 from ...host import scene_time
@@ -36,7 +37,7 @@ stiffness_cache = Cache()
 class FrameInput:
     """Input of the simulation in one frame. errors: of colliders that were left out or do not move.
 
-    wetness, stiffness: (G,) of each guide, None if they do not vary.
+    wetness: (G,) of each guide, None if it does not vary; varied: other settings that vary.
     """
 
     frame: int
@@ -45,7 +46,7 @@ class FrameInput:
     world: "dynamics.simulation.World"
     seconds: float
     wetness: np.ndarray | None = None
-    stiffness: np.ndarray | None = None
+    varied: VariedDynamics = field(default_factory=VariedDynamics)
     errors: tuple[HairError, ...] = ()
 
 
@@ -55,8 +56,8 @@ class GuideSimulation:
 
     digest, topology: of guides and surface; identity: of both, as `_identity_of`; start: their pose in the first frame;
     start_space, space: `surface_space.applied` to guides in the first frame, and now; obstacles: {name: obstacle in its
-    last valid state}; masks: {mask of wetness, or map of stiffness: (G,) its weights}; wetness, stiffness: of the
-    last frame, as in `FrameInput`.
+    last valid state}; masks: {mask of wetness: (G,) its weights, or map of a setting: (G,) its factors}; wetness,
+    varied: of the last frame, as in `FrameInput`.
     """
 
     digest: str
@@ -73,7 +74,7 @@ class GuideSimulation:
     parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
     masks: dict[Any, np.ndarray] = field(default_factory=dict)
     wetness: np.ndarray | None = None
-    stiffness: np.ndarray | None = None
+    varied: VariedDynamics = field(default_factory=VariedDynamics)
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
     may_have_other_faces: bool = False  # whether obstacles may change topology in the next frame
 
@@ -102,12 +103,12 @@ class GuideSimulation:
         return points
 
     def _change(self, frame):
-        """Use the settings, the wetness and the stiffness of a frame."""
-        are_same = _are_same(frame.wetness, self.wetness) and _are_same(frame.stiffness, self.stiffness)
+        """Use the settings, the wetness and the varied settings of a frame."""
+        are_same = _are_same(frame.wetness, self.wetness) and frame.varied.is_same(self.varied)
         if frame.settings != self.settings or not are_same:
             settings = in_meters(frame.settings, self.meters)
-            self.simulation.change(settings, wetness=frame.wetness, stiffness=frame.stiffness)
-            self.settings, self.wetness, self.stiffness = frame.settings, frame.wetness, frame.stiffness
+            self.simulation.change(settings, wetness=frame.wetness, varied=frame.varied.values(settings))
+            self.settings, self.wetness, self.varied = frame.settings, frame.wetness, frame.varied
 
     def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
         """Update the regions of guides to the present parting; returns whether they changed. Raises `HairError`."""
@@ -191,7 +192,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         regions=guide_regions.regions_of(guides, depsgraph),
         wetness=frame.wetness,
         held=held_of(guides),
-        stiffness=frame.stiffness,
+        varied=frame.varied.values(settings),
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
@@ -200,7 +201,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     ids, space = _identity_of(guides), surface_space.applied(guides)
     begun = GuideSimulation(digest, topology, ids, settings, pose, space, space, local[:, 0].copy(), simulation, meters)
     begun.parted_by = guide_regions.parting_keys(guides)
-    begun.masks, begun.wetness, begun.stiffness = masks, frame.wetness, frame.stiffness
+    begun.masks, begun.wetness, begun.varied = masks, frame.wetness, frame.varied
     begun.see(frame)
     return begun
 
@@ -228,8 +229,8 @@ def read(
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface, ways)
     seconds = settings.time_scale / scene_time.animation_rate(scene)
     wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
-    stiffness = varied_stiffness.of_guides(guides, pose.pose.surface, settings.bend_stiffness, masks)
-    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, stiffness, tuple(errors))
+    varied = varied_dynamics.of_guides(guides, pose.pose.surface, masks)
+    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, varied, tuple(errors))
 
 
 def simulated(settings: DynamicsSettings) -> DynamicsSettings:
@@ -265,7 +266,8 @@ def _keep_stiffness(guides, frame, local):
     standing = pose.root_pose(pose).carried(groom - groom[:, :1])
     vertices = dynamics.rod.detail.vertices_of(standing, settings.vertex_count)
     lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
-    material = dynamics.rod.material.material_of(settings, lengths, frame.wetness, frame.stiffness)
+    stiffness = frame.varied.values(settings).get("bend_stiffness")
+    material = dynamics.rod.material.material_of(settings, lengths, frame.wetness, stiffness)
     x, y, z = (settings.gravity * component for component in frame.world.gravity)
     factors = dynamics.rod.sag_free.least_stiffnesses(vertices, material, (x, y, z))
     needed = factors * settings.bend_stiffness

@@ -34,13 +34,13 @@ for (int i = 0; i <= segment_count; ++i) {
   force = force + wind * rate + along * ((1.0f - DRAG_ALONG) * rate * along_speed);
   lanes added = h * rate;
   vector step = velocity * lanes(h);
-  if (hold > 0.0f) {
+  if (has_hold) {
     const float along_part = static_cast<float>(i) / static_cast<float>(segment_count);
-    const float strength = hold * (1.0f + (hold_tip - 1.0f) * along_part);
-      const lanes critical = 2.0f * h * exact_sqrt_of(lanes(strength));
+    const lanes strength = hold * (1.0f + (hold_tip - 1.0f) * along_part);
+    const lanes critical = 2.0f * h * exact_sqrt_of(strength);
     const vector shape = get_vector(groom, i);
     const vector goal = root + rotated(root_frame, shape), goal_before = root_before + rotated(frame_before, shape);
-    force = force + (goal - point) * lanes(strength);
+    force = force + (goal - point) * strength;
     step = step + (goal - goal_before) * critical;
     added += h * h * strength + critical;
   }

@@ -31,6 +31,7 @@
 //     inertias                             M rows
 //     grooms, groom_frames                 3 (M + 1), 4 M rows: the groom in the root's frame
 //     pins                                 1 row: points from the root that follow the surface, if more than `pinned`
+//     responses                            2 rows: damping time and hold of the strand; below zero: those of the step
 //     drag_rates                           3 rows: the rate of drag of slow air [1/s]; by v [1/m], by ∛v [1/s ∛(s/m)]
 //     roots                                14 rows: position, frame at the frame's start; position, frame at its end
 //     positions_before, predictions        3 (M + 1) rows each: between stages
@@ -119,8 +120,7 @@ const auto rows_of = [&](const auto& array) {
 };
 const int segment_count = strands.lengths.shape[1];
 const int count = step.count, pinned = step.pinned;
-const float h = step.h, damping_time = step.damping_time, twist_ratio = step.twist_ratio;
-const float hold = step.hold, hold_tip = step.hold_tip;
+const float h = step.h, twist_ratio = step.twist_ratio, hold_tip = step.hold_tip;
 const float most_stretch = step.most_stretch;
 const wp::vec3 gravity = step.gravity;
 float *const x = rows_of(strands.positions), *const v = rows_of(strands.velocities);
@@ -135,6 +135,14 @@ float *const x_before = rows_of(strands.positions_before), *const q_before = row
 float* const predicted_rows = rows_of(strands.predictions);
 float *const mobility = rows_of(strands.mobilities), *const resets = rows_of(strands.resets);
 const lanes pins = get(rows_of(strands.pins), 0);
+const float* const response = rows_of(strands.responses);
+// A number of the strand's response, or that of the step.
+const auto response_of = [&](int row, float shared) {
+  const lanes own = get(response, row);
+  return own < 0.0f ? lanes(shared) : own;
+};
+const lanes damping_time = response_of(0, step.damping_time), hold = response_of(1, step.hold);
+const bool has_hold = any_of(hold > 0.0f);
 const auto is_free = [&](int i) { return pins < lanes(static_cast<float>(i)); };  // of a point after `pinned`
 float* const again = rows_of(strands.solved_again);
 const float *const root_rows = rows_of(strands.roots), *const found_rows = rows_of(around.found_planes);
@@ -165,7 +173,8 @@ const auto away_of = [&](int i) {
   const lanes stiffness = (h * h) * get(inverse_mass, i) / (get(bending, i - 1) * size * size);
   return AWAY * clamped(exact_sqrt_of(stiffness * (1.0f / STIFF)), lanes(1.0f), lanes(MOST_AWAY / AWAY));
 };
-const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
+const float inverse_square = 1.0f / (h * h);
+const lanes damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
 for (int substep = first; substep < end; ++substep) {
   // The root between the frame's two poses: positions linear, rotations by nlerp.
   const float part = static_cast<float>(substep + 1) / static_cast<float>(count);

@@ -77,6 +77,7 @@ class RodArrays:
     groom_frames: wp.array3d[float]  # 4 M, in the root's frame
     drag_rates: wp.array3d[float]  # 3: of slow air [1/s], per speed across [1/m], and per cube root of speed
     pins: wp.array3d[float]  # 1: number of points after the root that follow the surface, if above `pinned`
+    responses: wp.array3d[float]  # 2: damping time [s] and hold [1/s²]; below zero: those of the step
     # Surface.
     roots: wp.array3d[float]  # ROOT_ROWS
     # Between the stages of a substep.
@@ -106,6 +107,7 @@ ROWS = {
     "groom_frames": (4, 0),
     "drag_rates": None,
     "pins": None,
+    "responses": None,
     "roots": None,
     "positions_before": (0, 3),
     "predictions": (0, 3),
@@ -114,7 +116,7 @@ ROWS = {
     "resets": None,
     "solved_again": None,
 }
-_FIXED_ROWS = {"drag_rates": 3, "pins": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
+_FIXED_ROWS = {"drag_rates": 3, "pins": 1, "responses": 2, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:

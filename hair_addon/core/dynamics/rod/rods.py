@@ -70,9 +70,14 @@ def step_of(
         material.twist_ratio,
         settings.hold,
         settings.hold_tip,
-        int(settings.pinned * material.lengths.shape[1]),
+        pinned_count(settings.pinned, material.lengths.shape[1]),
         MOST_STRETCH / settings.stretch_stiffness**0.5,
     )
+
+
+def pinned_count(fraction: float, segment_count: int) -> int:
+    """Return the number of points after the root that follow the surface, for a pinned fraction of a strand."""
+    return int(fraction * segment_count)
 
 
 class Rods:
@@ -105,6 +110,7 @@ class Rods:
         self.scratch = rod_solver.scratch(self.segment_count, groups, self.device)
         self._mass_unit = 1.0  # [kg]
         self._held = rest.multipliers
+        self.respond()
         self.set_material(material, rest)
         self.set_groom(groom, rest)
         self.reset()
@@ -144,16 +150,29 @@ class Rods:
         self._put("grooms", rotations.rotated(back, groom - groom[:, :1]))
         self._put("groom_frames", rotations.product(back, rest.frames))
 
-    def hold(self, fractions: np.ndarray) -> None:
+    def hold(self, fractions: np.ndarray, pinned: np.ndarray | None = None) -> None:
         """Let the first fraction (S,) of each strand, in [0, 1], only follow the surface.
 
         The held part is rigid up to there: one more segment is held, as the shape between vertices depends on both.
+        pinned: (S,) counts of `pinned_counts` of each strand, None for those of the step.
         """
         require_count("fractions", np.size(fractions), self.strand_count)
         if not (np.min(fractions) >= 0.0 and np.max(fractions) <= 1.0):
             raise HairError("The held fraction of simulated strands must be from 0 to 1.")
         pins = np.minimum(np.ceil(np.asarray(fractions) * self.segment_count) + 1.0, self.segment_count)
-        self._put("pins", np.where(np.asarray(fractions) > 0.0, pins, 0.0)[:, None])
+        pins = np.where(np.asarray(fractions) > 0.0, pins, 0.0)
+        if pinned is not None:
+            require_count("pinned counts", len(pinned), self.strand_count)
+            pins = np.maximum(pins, pinned)
+        self._put("pins", pins[:, None])
+
+    def respond(self, damping_times: np.ndarray | None = None, holds: np.ndarray | None = None) -> None:
+        """Give each strand its own damping time (S,) [s] and hold (S,) [1/s²]; None for those of the step."""
+        rows = []
+        for values in (damping_times, holds):
+            rows.append(np.full(self.strand_count, -1.0) if values is None else np.asarray(values, np.float64))
+            require_count("responses", len(rows[-1]), self.strand_count)
+        self._put("responses", np.stack(rows, axis=1))
 
     def reset(self, positions: np.ndarray | None = None, turns: np.ndarray | None = None) -> None:
         """Reset strands to rest in their groom; positions and turns: as in `move_roots`, None for the groom's own."""

@@ -6,7 +6,7 @@ Settings are in SI units, so motion does not depend on the number of vertices, t
 
 from dataclasses import dataclass
 
-from ...params import Settings, param
+from ...params import Settings, declared, param
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class DynamicsSettings(Settings):
         low=0.0,
         high=0.5,
         precision=4,
+        may_vary=True,
     )
     weight: float = param(
         1.0, "Weight of the hair, as a multiple of the weight of its fibers", low=0.1, high=10.0, soft_high=4.0
@@ -88,7 +89,13 @@ class DynamicsSettings(Settings):
         subtype="FACTOR",
     )
     hold: float = param(
-        0.0, "Strength of the pull back to the combed shape in 1/s²", low=0.0, high=1e4, soft_high=1e3, precision=1
+        0.0,
+        "Strength of the pull back to the combed shape in 1/s²",
+        low=0.0,
+        high=1e4,
+        soft_high=1e3,
+        precision=1,
+        may_vary=True,
     )
     hold_tip: float = param(
         1.0,
@@ -102,7 +109,12 @@ class DynamicsSettings(Settings):
         True, "Let the combed shape be at rest under gravity, so that it does not sag", label="Sag-Free"
     )
     pinned: float = param(
-        0.0, "Fraction of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "Fraction of each guide, from the root, that only follows the surface",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     holds_ties: bool = param(
         True, "Let gathered hair only follow the surface up to its tie; behind the tie it swings", label="Hold ties"
@@ -174,3 +186,7 @@ class DynamicsSettings(Settings):
         above=0.0,
         high=1e6,
     )
+
+
+# Settings that may differ between guides: {name: its `Param`}.
+VARIED = {name: details for name, _default, details in declared(DynamicsSettings) if details.may_vary}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map of the bend stiffness gives each simulated guide its own stiffness."""
+"""Maps of the simulation give each guide its own bend stiffness, damping, hold and pinned length."""
 
 import bpy
 import numpy as np
@@ -7,14 +7,20 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.host import running
+from hair_addon.blender.live import dynamics_state, invalidation, live_hair, simulated_hair
 from hair_addon.core.dynamics.rod import material
-from hair_addon.core.dynamics.rod.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod.settings import VARIED, DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
+from tests.support.commands import run_here
 from tests.support.dynamics.swung import simulate, swing
 
 SETTING = "dynamics.bend_stiffness"
 LAST = 5
+
+# {setting: (value at From, value at To)}
+VALUES = {"bend_stiffness": (1.0, 500.0), "damping": (0.0, 0.25), "hold": (0.0, 500.0), "pinned": (0.0, 0.5)}
 
 
 @pytest.fixture
@@ -27,10 +33,24 @@ def swung(hair, tmp_path):
     return guides.data, hair.data
 
 
+@pytest.fixture
+def played(swung, monkeypatch):
+    """Return guides and hair that simulate while they play, as in a window."""
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    yield swung
+    live_hair.cancel_writing()
+    invalidation.clear()
+
+
 def baked(guides):
     """Return (G, P, 3) of the last frame of a new bake."""
     run_now(guide_baking.baking([guides], LAST, bpy.context.scene, True))
     return frame_folders.frames_of(guides).points_at(LAST)
+
+
+def play(first, last):
+    for frame in range(first, last + 1):
+        bpy.context.scene.frame_set(frame)
 
 
 def half_group():
@@ -42,44 +62,122 @@ def half_group():
     return group.name
 
 
-def test_each_half_moves_with_its_stiffness(swung):
-    """Guides where the map is 0 and 1 have the bits of guides with the stiffness of From and To everywhere."""
+@pytest.mark.parametrize("name", VALUES)
+def test_each_half_moves_with_its_value(swung, name):
+    """Guides where the map is 0 and 1 move like guides with the value of From and To everywhere."""
+    assert VALUES.keys() == VARIED.keys()
     guides, hair = swung
-    soft = baked(guides)
-    guides.vellus.dynamics.bend_stiffness = 500.0
-    stiff = baked(guides)
+    low, high = VALUES[name]
+    setattr(guides.vellus.dynamics, name, low)
+    of_low = baked(guides)
+    setattr(guides.vellus.dynamics, name, high)
+    of_high = baked(guides)
     x = np.array([curve.points[0].position.x for curve in guides.curves])
-    api.set_map(hair, SETTING, f"group:{half_group()}", low=0.002, high=1.0)
+    api.set_map(hair, f"dynamics.{name}", f"group:{half_group()}", low=low / high, high=1.0)
     found = baked(guides)
-    np.testing.assert_array_equal(found[x > 0.25], stiff[x > 0.25])
-    np.testing.assert_array_equal(found[x < -0.25], soft[x < -0.25])
-    assert np.abs(stiff - soft).max(axis=(1, 2)).min() > 1e-4
-    assert [one.setting for one in api.maps_of(hair)] == [SETTING]
+    tolerance = 1e-5 if name == "pinned" else 0.0
+    np.testing.assert_allclose(found[x > 0.25], of_high[x > 0.25], rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(found[x < -0.25], of_low[x < -0.25], rtol=0.0, atol=tolerance)
+    assert np.abs(of_high - of_low).max(axis=(1, 2)).min() > 1e-4
+    assert [one.setting for one in api.maps_of(hair)] == [f"dynamics.{name}"]
 
 
-def test_a_constant_map_is_the_value(swung):
+@pytest.mark.parametrize("name", VALUES)
+def test_a_constant_map_is_the_value(swung, name):
     """A constant map keeps the bits of the value; its factor multiplies the value; frames are outdated by a map."""
     guides, hair = swung
-    guides.vellus.dynamics.bend_stiffness = 4.0
+    value = VALUES[name][1]
+    setattr(guides.vellus.dynamics, name, value)
     whole, key = baked(guides), guide_baking.key_of(guides, bpy.context.scene)
-    api.set_map(hair, SETTING, "strand", low=1.0, high=1.0)
+    api.set_map(hair, f"dynamics.{name}", "strand", low=1.0, high=1.0)
     assert guide_baking.key_of(guides, bpy.context.scene) != key
     np.testing.assert_array_equal(baked(guides), whole)
-    api.set_map(hair, SETTING, "strand", low=0.5, high=0.5)
+    api.set_map(hair, f"dynamics.{name}", "strand", low=0.5, high=0.5)
     half = baked(guides)
-    api.clear_map(hair, SETTING)
+    api.clear_map(hair, f"dynamics.{name}")
     assert guide_baking.key_of(guides, bpy.context.scene) == key
-    guides.vellus.dynamics.bend_stiffness = 2.0
+    setattr(guides.vellus.dynamics, name, 0.5 * value)
     np.testing.assert_array_equal(baked(guides), half)
 
 
 @pytest.mark.parametrize(("source", "message"), [("group:lost", '"lost"'), ("clump", "Maps of guides")])
-def test_a_map_without_values_is_an_error(swung, source, message):
-    """A simulation whose map has a missing source, or of a kind that guides do not have, does not start."""
+def test_a_map_without_values_is_a_status(swung, tmp_path, source, message):
+    """A setting whose map has a missing source, or a kind that guides do not have, has its value, with a status."""
     guides, hair = swung
-    api.set_map(hair, SETTING, source)
-    with pytest.raises(HairError, match=message):
-        baked(guides)
+    value = baked(guides)
+    api.set_map(hair, SETTING, source, low=100.0, high=100.0)
+    bpy.context.view_layer.update()
+    assert message in guides.vellus.dynamics_status
+    np.testing.assert_array_equal(baked(guides), value)
+    play(1, 3)
+    assert message in guides.vellus.dynamics_status
+    path = tmp_path / "swung.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    ended = run_here("simulate", path, "--last-frame", 2, "--overwrite")
+    assert ended.status == 0 and message in ended.errors
+    guides, hair = bpy.data.hair_curves["Guides"], bpy.data.hair_curves["Hair"]
+    api.clear_map(hair, SETTING)
+    bpy.context.view_layer.update()
+    assert guides.vellus.dynamics_status == ""
+
+
+def test_a_map_without_values_does_not_stop_playing(played):
+    """While a source is missing, playback simulates with the setting's value; it continues when the source is back."""
+    guides, hair = played
+    play(1, 3)
+    before = simulated_hair.played_cache.get(guides.session_uid).frames[3]
+    api.set_map(hair, SETTING, "group:lost", low=100.0, high=100.0)
+    bpy.context.view_layer.update()
+    play(1, 3)
+    assert '"lost"' in guides.vellus.dynamics_status
+    np.testing.assert_array_equal(simulated_hair.played_cache.get(guides.session_uid).frames[3], before)
+    bpy.data.objects["Sphere"].vertex_groups.new(name="lost")
+    bpy.data.objects["Sphere"].data.update_tag()
+    bpy.context.view_layer.update()
+    assert guides.vellus.dynamics_status == ""
+    play(1, 3)
+    assert np.abs(simulated_hair.played_cache.get(guides.session_uid).frames[3] - before).max() > 1e-4
+
+
+def test_a_map_that_changes_during_playback_outdates_earlier_frames(played):
+    """Frames before a new map, or before its weights are painted, are outdated."""
+    guides, hair = played
+    name = half_group()
+    play(1, 3)
+    api.set_map(hair, SETTING, f"group:{name}", low=0.1)
+    bpy.context.view_layer.update()
+    play(4, 5)
+    sentence, values = dynamics_state.state_of(guides)
+    assert "with other settings" in sentence and values["frame"] == 3
+    play(1, 5)
+    assert "with other settings" not in dynamics_state.state_of(guides)[0]
+    sphere = bpy.data.objects["Sphere"]
+    sphere.vertex_groups[name].add(range(len(sphere.data.vertices)), 0.5, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    play(6, 7)
+    sentence, values = dynamics_state.state_of(guides)
+    assert "with other settings" in sentence and values["frame"] == 5
+
+
+def test_a_map_outdates_baked_frames(swung):
+    """Baked frames are shown as outdated by a new map and by painted weights, and are up to date without it."""
+    guides, hair = swung
+    name, sphere = half_group(), bpy.data.objects["Sphere"]
+    baked(guides)
+    bpy.context.view_layer.update()
+    as_baked = "Frames {first} to {last} are baked"
+    assert dynamics_state.state_of(guides)[0] == as_baked
+    api.set_map(hair, SETTING, f"group:{name}", low=0.1)
+    bpy.context.view_layer.update()
+    assert "with other settings" in dynamics_state.state_of(guides)[0]
+    baked(guides)
+    bpy.context.view_layer.update()
+    assert dynamics_state.state_of(guides)[0] == as_baked
+    sphere.vertex_groups[name].add(range(len(sphere.data.vertices)), 0.5, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    assert "with other settings" in dynamics_state.state_of(guides)[0]
 
 
 def test_stiffness_of_another_number_of_strands_is_an_error():
