@@ -197,8 +197,8 @@ class Simulation:
     ) -> None:
         """Continue with other settings, wetness and groom, with the same number of vertices.
 
-        groom: None for no change; wetness: (G,), None for that of the settings; varied: as in `__init__`. Raises `HairError` for
-        another number of vertices.
+        groom: None for no change; wetness: (G,), None for that of the settings; varied: as in `__init__`. Raises
+        `HairError` for another number of vertices.
         """
         varied = self._checked_varied(varied)
         wetness = self._checked_wetness(wetness)

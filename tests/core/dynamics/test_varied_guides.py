@@ -29,7 +29,7 @@ def moved(settings, varied, has_ball=False):
     groom = ways[:, None] * np.linspace(RADIUS, RADIUS + 0.15, 21)[None, :, None]
     pose = RootPose(groom[:, 0], np.tile(rotations.IDENTITY, (COUNT, 1)))
     mesh = subdivided_sphere(2, 0.085)
-    ball = Obstacle("Ball", mesh.vertices.astype(np.float64) + [0.05, 0.17, -0.13], mesh.triangles)
+    ball = Obstacle("Ball", np.add(mesh.vertices, [0.05, 0.17, -0.13]), mesh.triangles)
     world = World(obstacles=(ball,) if has_ball else ())
     simulation = Simulation(groom, settings, pose, world, DEVICE, varied=varied)
     for frame in range(1, 9):
