@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon.blender.groom.foreign import kept_hair
 from hair_addon.core.errors import HairError
+from tests.support import placed_hair
 from tests.support.interface.layout import draw
 from tests.support.reading import snapshot
 
@@ -62,18 +63,25 @@ def curves_around(sphere, rng):
 
 
 def ends_and_radii(curves_object):
-    """Return ((C, 2, 3) ends of curves in the world, (C,) radii at their roots)."""
+    """Return ((C, 2, 3) ends of curves, (C,) radii at their roots), both in the world."""
     datablock, found, radii = curves_object.data, [], []
+    size = placed_hair.world_scale(curves_object)
     for curve in datablock.curves:
         for place in (curve.first_point_index, curve.first_point_index + curve.points_length - 1):
             found.append(curves_object.matrix_world @ datablock.points[place].position)
-        radii.append(datablock.attributes["radius"].data[curve.first_point_index].value)
+        radii.append(size * datablock.attributes["radius"].data[curve.first_point_index].value)
     return np.array(found).reshape(-1, 2, 3), np.array(radii)
 
 
-@pytest.mark.parametrize("name", ["use_as_guides", "use_as_hair"])
-def test_all_selected_objects_become_one_system(curves_around, name):
+@pytest.mark.parametrize(
+    ("name", "place"), [("use_as_guides", "small"), ("use_as_hair", "uneven"), ("use_as_hair", "mirrored")]
+)
+def test_all_selected_objects_become_one_system(curves_around, sphere, name, place):
+    """All selected objects become one system, with their points and widths in the world."""
     _made, ends, radii = curves_around
+    placed_hair.PLACES[place](sphere)
+    bpy.context.view_layer.update()
+    sphere.data.transform(sphere.matrix_world.inverted())  # the sphere stays where the curves are
     assert "The 3 selected objects become one." in " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
     options = {"strand_count": 50} if name == "use_as_guides" else {}
     assert getattr(bpy.ops.vellus, name)(**options) == {"FINISHED"}
@@ -85,8 +93,7 @@ def test_all_selected_objects_become_one_system(curves_around, name):
     order = [np.linalg.norm(found - pair, axis=(1, 2)).argmin() for pair in ends]
     assert sorted(order) == list(range(20))
     np.testing.assert_allclose(found[order], ends, atol=1e-5)
-    found_radii = found_radii[order]
-    np.testing.assert_allclose(found_radii / found_radii[0], radii / radii[0], rtol=1e-3)
+    np.testing.assert_allclose(found_radii[order], radii, rtol=1e-3)
 
 
 def refuse(*_arguments, **_options):
