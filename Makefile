@@ -21,16 +21,16 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
 # As many processes test as there are processors: threads of Mesa and of OpenBLAS would only wait for one another.
-test: export LP_NUM_THREADS = 0
-test: export OPENBLAS_NUM_THREADS = 1
+test farm: export LP_NUM_THREADS = 0
+test farm: export OPENBLAS_NUM_THREADS = 1
 
 # All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except benchmarks and tests in a window, in up to four processes
 	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)
 	$(python) -m pytest -m "not long and not desktop and not farm" --ignore tests/desktop --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
-	$(python) -m pytest -m farm tests/command_line $(ARGS)
+farm: $(installed) ## tests of processes that share frames, and of farms on this machine: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
+	$(python) -m pytest -m farm --numprocesses 2 --dist loadfile tests/command_line tests/blender/io $(ARGS)
 
 # Three processes, as walks wait for a quarter of their time.
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop

@@ -111,6 +111,7 @@ def test_progress_is_for_terminals_only(tmp_path):
         assert reported.rpartition("\r\x1b[K")[2] == ""
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize("killed", [1, 2], ids=["one", "all"])
 def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monkeypatch, killed):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))

@@ -124,6 +124,7 @@ def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
     np.testing.assert_array_equal(pixels(tmp_path / ALL[3]), pixels(whole / ALL[3]))
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
 def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
     with start(turning, tmp_path) as process:
@@ -163,6 +164,7 @@ def test_another_machine_goes_on(turning, whole, tmp_path):
         np.testing.assert_array_equal(pixels(there / name), pixels(whole / name))
 
 
+@pytest.mark.farm
 def test_processes_share_the_frames(turning, whole, tmp_path, monkeypatch):
     """Workers of one command share the frames, also with another command that runs at the same time."""
     others, sentence_of = [], render._sentence
@@ -223,6 +225,7 @@ def test_a_folder_without_space_is_reported(turning, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.farm
 def test_a_failing_worker_reports_its_error_once(turning, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", PYTHONPATH)
     bpy.ops.wm.open_mainfile(filepath=str(turning))
