@@ -43,7 +43,13 @@ class Settings(ProfiledSettings):
         may_vary=True,
     )
     random_turn: float = param(
-        0.0, "Random variation of the direction", label="Random direction", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "Random variation of the direction",
+        label="Random direction",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
 
 

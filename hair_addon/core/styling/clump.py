@@ -84,7 +84,9 @@ class Settings(ProfiledSettings):
         subtype="FACTOR",
         is_structural=True,
     )
-    stray: float = param(0.03, "Part of the strands that joins no lock", low=0.0, high=1.0, subtype="FACTOR")
+    stray: float = param(
+        0.03, "Part of the strands that joins no lock", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
+    )
     tip_level: int = param(
         0,
         "Level of locks whose strands curl alike in the styles below; 0 is the largest",

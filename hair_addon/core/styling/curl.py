@@ -77,6 +77,7 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=0.9,
         subtype="FACTOR",
+        may_vary=True,
     )
     flatness: float = param(
         0.0,
@@ -94,9 +95,15 @@ class Settings(ProfiledSettings):
         subtype="FACTOR",
         may_vary=True,
     )
-    stretch: float = param(0.0, "Lengthen the coils near the roots by this factor", low=0.0, high=4.0)
+    stretch: float = param(0.0, "Lengthen the coils near the roots by this factor", low=0.0, high=4.0, may_vary=True)
     left_handed: float = param(
-        0.5, "Part of the locks that winds to the left", label="Left-handed", low=0.0, high=1.0, subtype="FACTOR"
+        0.5,
+        "Part of the locks that winds to the left",
+        label="Left-handed",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     switchback: float = param(
         0.0,

@@ -74,7 +74,12 @@ class Settings(ProfiledSettings):
         subtype="FACTOR",
     )
     coherence: float = param(
-        0.0, "How alike neighboring strands move; at 0 each has noise of its own", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "How alike neighboring strands move; at 0 each has noise of its own",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     spread: float = param(
         0.02,
@@ -84,10 +89,11 @@ class Settings(ProfiledSettings):
         soft_high=0.2,
         unit="LENGTH",
         subtype="DISTANCE",
+        may_vary=True,
     )
-    stray: float = param(0.03, "Part of the strands that fly away", low=0.0, high=1.0, subtype="FACTOR")
+    stray: float = param(0.03, "Part of the strands that fly away", low=0.0, high=1.0, subtype="FACTOR", may_vary=True)
     stray_gain: float = param(
-        3.0, "Amplitude of strands that fly away, as a multiple of the others'", low=0.0, high=20.0
+        3.0, "Amplitude of strands that fly away, as a multiple of the others'", low=0.0, high=20.0, may_vary=True
     )
     keep_length: float = param(
         1.0,

@@ -20,10 +20,18 @@ CASES = {
     "trim": (trim.Settings(undercoat=0.2), (), {"factor": (0.8, 0.3), "random": (0.1, 0.5), "undercoat": (0.2, 0.6)}),
     "curl": (curl.Settings(), (), {"radius": (0.004, 0.0), "pitch": (0.02, 0.05), "flatness": (0.1, 1.0)}),
     "curl in locks": (curl.Settings(), BELOW[:1], {"radius": (0.004, 0.007), "coherence": (0.9, 0.2)}),
+    "hands of curls": (
+        curl.Settings(),
+        (),
+        {"pitch_vary": (0.0, 0.6), "stretch": (0.0, 1.5), "left_handed": (0.0, 0.9)},
+    ),
     "frizz": (frizz.Settings(octaves=3), (), {"amplitude": (0.002, 0.005), "wavelength": (0.02, 0.07)}),
-    "bend": (bend.Settings(), (), {"angle": (0.5, -3.0), "turn": (0.0, 1.0)}),
+    "coherent frizz": (frizz.Settings(), (), {"coherence": (0.0, 0.8), "spread": (0.02, 0.05)}),
+    "stray frizz": (frizz.Settings(), (), {"stray": (0.0, 0.4), "stray_gain": (1.0, 5.0)}),
+    "bend": (bend.Settings(), (), {"angle": (0.5, -3.0), "turn": (0.0, 1.0), "random_turn": (0.0, 0.7)}),
     "smooth": (smooth.Settings(), BELOW[1:], {"length": (0.02, 0.1)}),
     "clump": (clump.Settings(levels=1), BELOW[1:], {"thickness": (0.1, 0.6), "twist": (0.0, 1.5)}),
+    "stray strands": (clump.Settings(levels=1), BELOW[1:], {"stray": (0.0, 0.5)}),
     "braid": (braid.Settings(), (), {"radius": (0.006, 0.01), "pitch": (0.04, 0.06), "thickness": (0.1, 0.3)}),
 }
 
