@@ -4,7 +4,8 @@
 A share runs in a thread and starts with a redraw, so nothing is followed for a region that is not shown. On the
 processor it pauses while viewports are redrawn. The picture changes from dual scattering to paths in steps. While
 something moves, the measured light stays in its voxels. Its part of the picture decreases with changes of hair, lights
-and looks; its weight relative to new paths also decreases with the angle by which the view has turned.
+and looks; its weight relative to new paths also decreases with the angle by which the view has turned. After a turn
+the picture changes from the light that it shows to that of new paths in steps, too, as the first paths are noisy.
 """
 
 import os
@@ -308,7 +309,9 @@ class LiveLight:
         self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
         self._known = None  # (`_Content`, part) of the textures
         self._grid, self._textures, self._scene = None, (), (None, None)
+        self._means = self._turned = None  # of the textures; of those shown when the view turned
         self._acted, self._tried, self._goal, self._seed = -np.inf, 0, 0, 0
+        self._faded = 0.0  # part of the weight of former paths that the last turn of the view took
         self._is_done = False
 
     @property
@@ -384,17 +387,20 @@ class LiveLight:
             samples = light_paths.SAMPLES_A_PATH * count
             request["shown"] = seen_strands.draw(drawn, camera, window, samples, self._seed)
             self._tried = self._goal = 0
+            self._turned = None if "surroundings" in request else self._means
             if before is not None:
                 request["weight"] = content.part_since(before[0]) * _view_weight(camera, before[1], content.centre)
                 request["shift"] = content.centre - before[0].centre
         share = min(max((self._goal or count) // _SHARES, _LEAST_SHARE), _MOST_SHARE)
         work = _Request(count=share, **request)
+        if work.shown is not None:
+            self._faded = 1.0 - work.weight
         self._seed += 1
         self._job = Job(lambda progress: self._follow(work, progress))
         _jobs[:] = [self._job]
 
     def _follow(self, work, progress):
-        """In the thread: (paths of the share, paths of the picture, shares by voxel); None if no strand is in sight."""
+        """In the thread: (paths of the share, shares by voxel); None if no strand is in sight."""
         if sys.platform == "linux":
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
 
@@ -448,14 +454,29 @@ class LiveLight:
             self._is_done = True
             return
         taken, means = result
-        self._textures, self._grid = tuple(light_grid.upload(of_hair) for of_hair in means), self._paths.grid
         part = min(self._part() + min(taken * _SHARES / self._goal, 1.0) / _RAMP, 1.0)
         self._known, self._scene = (self._content, part), (None, None)
         self._tried += taken
         if self._paths.taken >= self._goal:
             self._former = None
         is_known = self._paths.taken >= self._goal and self._paths.wanted < 1.0
-        self._is_done = part == 1.0 and (is_known or self._tried >= light_paths.MOST_TIMES * self._goal)
+        is_spent = self._tried >= light_paths.MOST_TIMES * self._goal
+        new_part = 1.0 if is_spent or self._turned is None else self._new_part()
+        self._is_done = part == 1.0 and (is_spent or (is_known and new_part == 1.0))
+        if new_part < 1.0:
+            both = zip(self._turned, means, strict=True)
+            means = [before + np.float32(new_part) * (now - before) for before, now in both]
+        self._textures, self._grid = tuple(light_grid.upload(of_hair) for of_hair in means), self._paths.grid
+        self._means = means
+
+    def _new_part(self):
+        """Return how much of the shown light follows the paths since the view turned, from 0 to 1.
+
+        All of it does after a fraction of the paths that make the light known: the weight that the turn took from
+        former paths.
+        """
+        known = max(self._goal, self._paths.taken * self._paths.wanted)
+        return min(self._tried / max(self._faded * min(known, light_paths.MOST_TIMES * self._goal), 1.0), 1.0)
 
     def _part(self):
         """Return the part of the picture's light that is measured light, from 0 to 1."""

@@ -116,6 +116,29 @@ def test_a_view_that_turns_keeps_the_light(view):
     assert 0.5 * before < live._paths.taken < before + PATHS
 
 
+def test_no_frame_jumps_in_brightness_while_the_view_turns_and_comes_to_rest(view):
+    """Over a turn by 90 degrees and the rest after it, the mean level changes by at most 5 % from frame to frame.
+
+    The first redraw after the last motion is as bright as the motion's last frame, and the light ends as that of
+    paths in the new view alone.
+    """
+    camera, read = view
+    drawn, live = read(), live_light.LiveLight()
+    found = at_rest(live, drawn, camera)
+    for angle in range(0, 91, 15):
+        there = turned(camera, float(angle))
+        assert redrawn(live, drawn, there, may_follow=False) is found
+    levels = []
+    while not live.is_done:
+        levels.append(picture_of(redrawn(live, drawn, there), there).mean())
+        live.wait()
+    levels.append(picture_of(redrawn(live, drawn, there), there).mean())
+    assert levels[0] == picture_of(found, there).mean() and len(levels) > 5
+    assert np.abs(np.diff(levels) / levels[1:]).max() < 0.05
+    alone = picture_of(at_rest(live_light.LiveLight(), drawn, there), there).mean()
+    assert levels[-1] == pytest.approx(alone, rel=0.04)
+
+
 def test_changed_lights_are_forgotten(view):
     """A lamp that is turned off leaves nothing of its light; one that dims a little leaves most."""
     camera, read = view
