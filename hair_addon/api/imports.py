@@ -36,6 +36,7 @@ __all__ = [
     "MeshStrandSettings",
     "TransferSettings",
     "import_curves",
+    "import_groups",
     "mesh_to_hair",
     "transfer_groom",
     "use_as_guides",
@@ -195,15 +196,39 @@ def import_curves(
     >>> len(used.hair.curves) == len(bpy.data.objects["Hair"].data.curves), found.notes
     (True, [])
     """
-    choice(kind, "kind", ("GUIDES", "HAIR"))
-    if up is not None:
-        choice(up, "axis", tuple(TO_Z_UP))
-    meters = None if unit is None else parsed_unit(str(unit))
-    wanted = blender.io.curve_files.Wanted(kind, name, Convention(meters, up))
+    wanted = _wanted(kind, name, unit, up)
     with blender.io.curve_files.curves_of(
         path_of(path), wanted, blender.data.arguments.surface_object(surface)
     ) as found:
         return found
+
+
+def import_groups(
+    path: str | os.PathLike,
+    surface: MeshObject,
+    kind: str = "HAIR",
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+) -> "list[Found]":
+    """Read each group of a groom from a file, for a hair system of its own; arguments: as of `import_curves`.
+
+    >>> api.export_groom("groom.abc", [bpy.data.objects["Hair"]])
+    []
+    >>> [len(found.curves.data.curves) for found in api.import_groups("groom.abc", bpy.data.objects["Scalp"])]
+    [1000]
+    """
+    wanted = _wanted(kind, "", unit, up)
+    return blender.io.curve_files.groups_of(path_of(path), wanted, blender.data.arguments.surface_object(surface))
+
+
+def _wanted(kind, name, unit, up):
+    """Return the checked `Wanted`. Raises `HairError`."""
+    choice(kind, "kind", ("GUIDES", "HAIR"))
+    if up is not None:
+        choice(up, "axis", tuple(TO_Z_UP))
+    meters = None if unit is None else parsed_unit(str(unit))
+    return blender.io.curve_files.Wanted(kind, name, Convention(meters, up))
 
 
 def transfer_groom(

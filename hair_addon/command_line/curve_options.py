@@ -55,6 +55,11 @@ def add_curves(parser):
         help="object or group in either file [all]",
     )
     parser.add_argument(
+        "--by-group",
+        action="store_true",
+        help="make a hair system of each group of a groom, in a .blend, instead of one of all groups",
+    )
+    parser.add_argument(
         "--unit",
         metavar="UNIT",
         help=f"unit in either file: {', '.join(UNITS)}, or the number of meters in a unit [the file's own]",
@@ -70,9 +75,11 @@ def checked(given):
         raise HairError("--from-mesh has the hair: leave out --guides-from and --hair-from.")
     if (given.mesh_roots or given.fill_thickness) and not given.from_mesh:
         raise HairError("--mesh-roots and --fill-thickness need --from-mesh.")
-    for name in ("object", "unit"):
+    for name in ("object", "unit", "by_group"):
         if getattr(given, name) and not came_from:
-            raise HairError(f"--{name} needs --guides-from or --hair-from.")
+            raise HairError(f"--{name.replace('_', '-')} needs --guides-from or --hair-from.")
+    if given.by_group and given.out.suffix.lower() != ".blend":
+        raise HairError("--by-group needs a .blend file as output: other files have one hair system.")
     is_blend = came_from is not None and came_from.suffix.lower() == ".blend"
     if is_blend and given.unit:
         raise HairError("--unit has no effect on a .blend file, which has its own.")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """groom: a mesh → guides and hair."""
 
+import contextlib
 import time
-from contextlib import contextmanager
 from dataclasses import replace
 
 from ..core import lazy
@@ -68,21 +68,31 @@ def run(given, console):
     settings = map_options.mapped(given, _styled(given, settings, surface))
     started = time.perf_counter()
     if given.from_library:
-        guides, hair = _from_library(given, surface, console)
-    elif given.guides_from:
-        guides, hair = _follow_curves(given, surface, settings, file_axes, console)
+        systems = [_from_library(given, surface, console)]
     elif given.from_mesh:
-        guides, hair = _of_mesh(given, surface, settings, console)
-    elif given.hair_from:
-        guides, hair = _keep_curves(given, surface, settings, file_axes, console)
+        systems = [_of_mesh(given, surface, settings, console)]
+    elif came_from:
+        use = _follow_curves if given.guides_from else _keep_curves
+        with _curves_of("GUIDES" if given.guides_from else "HAIR", given, surface, file_axes, console) as groups:
+            systems = [use(given, surface, settings, found, console) for found in groups]
     else:
-        guides, hair = _grow(surface, settings, console)
+        systems = [_grow(surface, settings, console)]
+    guides, hair = systems[0]
     seconds = time.perf_counter() - started
     console.progress("Writing", 1.0)
     blender.io.groom_files.write(given.out, guides, hair, file_axes)
-    counts = {"guides": len(guides.curves), "strands": len(hair.curves)}
+    counts = {
+        "guides": sum(len(one.curves) for one, _ in systems),
+        "strands": sum(len(one.curves) for _, one in systems),
+    }
+    if given.by_group:
+        counts["systems"] = len(systems)
     values = {"verb": "groom", "input": str(given.input), "surface": surface.name, "out": str(given.out), **counts}
-    values |= {"points": len(hair.points), "seconds": round(seconds, 3), "bytes": given.out.stat().st_size}
+    values |= {
+        "points": sum(len(one.points) for _, one in systems),
+        "seconds": round(seconds, 3),
+        "bytes": given.out.stat().st_size,
+    }
     made = f"{counts['guides']} guides, {counts['strands']} strands on {surface.name}"
     console.result(values, f"{made} in {seconds:.2f} s: {given.out}")
 
@@ -127,39 +137,37 @@ def _from_library(given, surface, console):
     return applied.made.guides, applied.made.hair
 
 
-def _follow_curves(given, surface, settings, file_axes, console):
-    """Return (guides, hair) from the curves in another file, or in the open one."""
+def _follow_curves(given, surface, settings, found, console):
+    """Return (guides, hair) from the curves of a `Found`."""
     _warn_of_useless(options.options_given(given, _OF_GUIDES), f"Guides come from {given.guides_from}", console)
-    with _curves_of("GUIDES", given, surface, file_axes, console) as found:
-        work = blender.groom.transfer.groom_settings.using_as_guides(
-            found.curves, surface, settings, blender.data.scene.present_depsgraph()
-        )
-        made = run_now(work, console.progress)
+    work = blender.groom.transfer.groom_settings.using_as_guides(
+        found.curves, surface, settings, blender.data.scene.present_depsgraph()
+    )
+    made = run_now(work, console.progress)
     for sentence, values in made.notes():
         console.warn(sentence.format(**values))
     return made.guides, made.hair
 
 
-def _keep_curves(given, surface, settings, file_axes, console):
-    """Return (guides, hair) with the curves in another file, or in the open one, as hair.
+def _keep_curves(given, surface, settings, found, console):
+    """Return (guides, hair) with the curves of a `Found` as hair.
 
     Guides are those of the hair in that file, or are derived from the hair.
     """
     useless = options.options_given(given, _OF_GROWTH) + (["--style"] if given.styles else [])
     useless += ["--style-preset"] if given.style_preset else []
     _warn_of_useless(useless, f"Hair is kept as it came from {given.hair_from}", console)
-    with _curves_of("HAIR", given, surface, file_axes, console) as found:
-        if found.guides is not None:
-            counts = options.options_given(given, [("guide_count",)])
-            _warn_of_useless(counts, f"Guides come from {given.hair_from} too", console)
-        work = blender.groom.foreign.kept_hair.using_as_hair(
-            found.curves,
-            surface,
-            blender.data.scene.present_depsgraph(),
-            DerivationSettings(guide_count=settings.guides.guide_count),
-            guides_object=found.guides,
-        )
-        made = run_now(work, console.progress)
+    if found.guides is not None:
+        counts = options.options_given(given, [("guide_count",)])
+        _warn_of_useless(counts, f"Guides come from {given.hair_from} too", console)
+    work = blender.groom.foreign.kept_hair.using_as_hair(
+        found.curves,
+        surface,
+        blender.data.scene.present_depsgraph(),
+        DerivationSettings(guide_count=settings.guides.guide_count),
+        guides_object=found.guides,
+    )
+    made = run_now(work, console.progress)
     for sentence, values in made.notes():
         console.warn(sentence.format(**values))
     if found.guides is None:
@@ -225,15 +233,19 @@ def _warn_of_useless(names, reason, console):
         console.warn(f"{reason}: {', '.join(names)} {has} no effect.")
 
 
-@contextmanager
+@contextlib.contextmanager
 def _curves_of(kind, given, surface, file_axes, console):
-    """Context with the `Found` of a curve file, which may be the open one; prints its notes."""
+    """Context with [`Found`] of a curve file, which may be the open one, one for each hair system; prints its notes."""
     path = given.guides_from or given.hair_from
     wanted = curve_options.wanted(kind, given, file_axes)
     is_open = path.resolve() == given.input.resolve()
     if not is_open:
         import_mesh.try_curves(path, console)
-    with blender.io.curve_files.curves_of(path, wanted, surface, is_open) as found:
-        for note in found.notes:
+    with contextlib.ExitStack() as stack:
+        if given.by_group:
+            groups = blender.io.curve_files.groups_of(path, wanted, surface)
+        else:
+            groups = [stack.enter_context(blender.io.curve_files.curves_of(path, wanted, surface, is_open))]
+        for note in (note for found in groups for note in found.notes):
             console.warn(str(note))
-        yield found
+        yield groups

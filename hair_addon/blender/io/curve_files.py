@@ -167,6 +167,38 @@ def reading(path):
     return (yield compute)
 
 
+def groups_of(path, wanted, surface_object):
+    """Return the `Found` of each group of a groom in a file, in the open scene. Raises `HairError`."""
+    path = Path(path)
+    require_readable(path)
+    if path.suffix.lower() == ".blend":
+        raise HairError("{path} is a .blend file, which has objects instead of groups: name one.", path=path)
+    parts = parts_of(path, read(path, wanted.axis), wanted, surface_object)
+    return [made_of(path, part, of_part, surface_object) for part, of_part in parts]
+
+
+def parts_of(path, file, wanted, surface_object):
+    """Return [(`CurveFile`, `Wanted`)] of each group of the requested curves, with the guides of the group.
+
+    Unit and axis are those of the whole file, and notes on the file belong to the first group. Raises `HairError`.
+    """
+    path = Path(path)
+    chosen, guides = _chosen_sets(path, file.sets, wanted)
+    surface = curve_objects.world_mesh(surface_object)
+    reading = curve_units.choose(file, [*chosen, *guides], wanted.convention, surface, str(path))
+    its = replace(wanted, name="", convention=Convention(reading.meters, reading.up))
+    groups, notes, parts = dict.fromkeys(_group(one) for one in chosen), [*file.notes, *reading.notes], []
+    for group in groups:
+        sets = [one for one in [*chosen, *guides] if _group(one) == group]
+        parts.append((replace(file, sets=sets, notes=[] if parts else notes), its))
+    return parts
+
+
+def _group(one):
+    """Return what distinguishes the group of a `CurveSet`."""
+    return one.group_id, one.group_name
+
+
 def made_of(path, file, wanted, surface_object):
     """Create the `Found` of a `CurveFile` in the open scene. Raises `HairError`."""
     path = Path(path)
@@ -242,8 +274,8 @@ def _chosen_sets(path, sets, wanted):
     )
     if is_guide or chosen[0].is_guide is not False:
         return chosen, []
-    groups = {(one.group_id, one.group_name) for one in chosen}
-    return chosen, [one for one in every if one.is_guide and (one.group_id, one.group_name) in groups]
+    groups = {_group(one) for one in chosen}
+    return chosen, [one for one in every if one.is_guide and _group(one) in groups]
 
 
 def _notes_on_groups(path, chosen):

@@ -214,6 +214,9 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
             "Axis that points up in the file. Automatic uses the file's own axis, or one that puts roots on the mesh",
             {_FOUND: "Automatic", "X": "X", "Y": "Y", "Z": "Z"},
         ),
+        "by_group": properties.switch(
+            "Groups as Systems", "Make a hair system of each group of a groom, instead of one of all groups", False
+        ),
         **setting_properties.annotations(DerivationSettings),
     }
     asked = "filepath"
@@ -224,7 +227,7 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and surface_of(context.object) is not None
 
     def draw(self, context):
-        for name in ("kind", "object_name", "unit", "up"):
+        for name in ("kind", "object_name", "by_group", "unit", "up"):
             setting_rows.row(self.layout, self.properties, name)
         column = self.layout.column()
         column.active = self.kind == "HAIR"
@@ -239,30 +242,40 @@ class VELLUS_OT_import_groom(BrowsedOperator, bpy.types.Operator):
         plays = self.kind == "HAIR" and bool(bpy.data.filepath)
         wanted = io.curve_files.Wanted(self.kind, self.object_name, convention, plays=plays)
         settings = setting_properties.given_settings(self, DerivationSettings)
-        return _importing(path, wanted, surface, settings)
+        return _importing(path, wanted, surface, settings, self.by_group)
 
     def message(self, made):
-        made = made.made
-        if made.hair is None:
-            return "{count} guides", {"count": len(made.guides.curves)}
-        counts = {"guide_count": len(made.guides.curves), "strand_count": len(made.hair.curves)}
+        counts = {"guide_count": sum(len(one.made.guides.curves) for one in made)}
+        if made[0].made.hair is None:
+            return "{count} guides", {"count": counts["guide_count"]}
+        counts["strand_count"] = sum(len(one.made.hair.curves) for one in made)
         return "{guide_count} guides, {strand_count} strands", counts
 
     def after(self, context, made):
-        shown = object_of(made.made.hair, context.view_layer)
+        shown = object_of(made[0].made.hair, context.view_layer)
         if shown is not None:
             make_active(shown, context.view_layer)
-        for note in made.notes:
-            self.report({"WARNING"}, error_text(note))
-        for sentence, values in made.made.notes():
-            self.report({"WARNING"}, report_text(sentence, **values))
+        for one in made:
+            for note in one.notes:
+                self.report({"WARNING"}, error_text(note))
+            for sentence, values in one.made.notes():
+                self.report({"WARNING"}, report_text(sentence, **values))
 
 
-def _importing(path, wanted, surface, settings):
-    """Read a file and use its curves, as work in steps."""
+def _importing(path, wanted, surface, settings, by_group):
+    """Read a file and use its curves, as work in steps; returns [`_Imported`] of each hair system."""
     place = Remembered(surface)
     file = yield from io.curve_files.reading(path)
-    surface = place.find()
+    parts, made = [(file, wanted)], []
+    if by_group:
+        parts = io.curve_files.parts_of(path, file, wanted, place.find())
+    for part, of_part in parts:
+        made.append((yield from _using(path, part, of_part, place.find(), settings)))
+    return made
+
+
+def _using(path, file, wanted, surface, settings):
+    """Use the curves of a read file, as work in steps; returns `_Imported`."""
     found = io.curve_files.made_of(path, file, wanted, surface)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     if wanted.kind == "GUIDES":

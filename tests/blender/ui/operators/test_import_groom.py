@@ -7,8 +7,11 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data.strands import attributes, exported_curves
+from hair_addon.blender.groom.foreign import kept_hair
 from hair_addon.blender.io import curve_files
 from hair_addon.blender.ui import menus, panels
+from hair_addon.core.errors import HairError
+from tests.support.commands import run_here
 from tests.support.dynamics.following import update
 from tests.support.exchange.alembic_files import of_maya
 from tests.support.exchange.imported import curves_object, lines_on, world
@@ -138,3 +141,73 @@ def test_it_is_in_the_menu_and_in_the_panel(hair, monkeypatch):
     assert panels.CLASSES and bpy.ops.vellus.import_groom.poll()
     bpy.context.view_layer.objects.active = None
     assert not bpy.ops.vellus.import_groom.poll()
+
+
+@pytest.fixture
+def two_systems(hair, tmp_path):
+    """Return ({strand count: points of the hair} of two hair systems on a sphere, and the file of both)."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    bpy.ops.vellus.add_hair(guide_count=15, strand_count=70, length=0.2)
+    update()
+    path = tmp_path / "two.abc"
+    api.export_groom(path, [hair, bpy.context.object])
+    return {len(one.data.curves): world(one) for one in (hair, bpy.context.object)}, path
+
+
+def test_groups_become_hair_systems_with_their_own_guides(two_systems):
+    """Each group of a groom is a hair system: its strands, and guides whose weights are those of the group."""
+    wanted, path = two_systems
+    before = set(bpy.data.hair_curves)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    assert bpy.ops.vellus.import_groom(filepath=str(path), by_group=True) == {"FINISHED"}
+    update()
+    made = [one for one in set(bpy.data.hair_curves) - before if one.vellus.kind == "HAIR"]
+    assert {len(one.curves) for one in made} == set(wanted) == {500, 70}
+    assert len({one.vellus.guide_curves for one in made}) == 2
+    shown = {one.data: one for one in bpy.data.objects if one.data in made}
+    for one in made:
+        np.testing.assert_allclose(world(shown[one]), wanted[len(one.curves)], atol=1e-6)
+        assert (len(one.vellus.guide_curves.curves) == 15) == (len(one.curves) == 70)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    assert bpy.ops.vellus.import_groom(filepath=str(path)) == {"FINISHED"}
+    assert max(len(one.curves) for one in bpy.data.hair_curves) == 570  # without the option
+
+
+def test_groups_are_all_imported_or_none(two_systems, monkeypatch):
+    """A failure in the second group leaves nothing of the first one."""
+    _wanted, path = two_systems
+    before, used = sorted(bpy.data.objects.keys()), []
+
+    def failing(*given, **options):
+        used.append(given)
+        if len(used) == 2:
+            raise HairError("No room.")
+        return using(*given, **options)
+
+    using = kept_hair.using_as_hair
+    monkeypatch.setattr(kept_hair, "using_as_hair", failing)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    with pytest.raises(RuntimeError, match="No room"):
+        bpy.ops.vellus.import_groom(filepath=str(path), by_group=True)
+    assert sorted(bpy.data.objects.keys()) == before and len(used) == 2
+
+
+def test_scripts_and_the_command_line_read_groups_too(two_systems, tmp_path):
+    wanted, path = two_systems
+    found = api.import_groups(path, bpy.data.objects["Sphere"])
+    assert [len(one.curves.data.curves) for one in found] == [*wanted]
+    assert [len(one.guides.data.curves) for one in found][1] == 15
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"))
+    words = ("groom", tmp_path / "head.blend", "--hair-from", path, "--by-group", "--out")
+    (told,) = run_here(*words, tmp_path / "out.blend", "--json").results
+    assert (told["systems"], told["strands"]) == (2, 570)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    assert {len(one.curves) for one in bpy.data.hair_curves if one.vellus.kind == "HAIR"} == {500, 70}
+    ended = run_here(*words, tmp_path / "out.usdc")
+    assert ended.status == 1 and "needs a .blend file as output" in ended.errors
+    ended = run_here("groom", tmp_path / "head.blend", "--by-group", "--out", tmp_path / "o.blend")
+    assert ended.status == 1 and "--by-group needs --guides-from or --hair-from" in ended.errors
+    with pytest.raises(HairError, match="objects instead of groups"):
+        api.import_groups(tmp_path / "out.blend", bpy.context.view_layer.objects.active)
