@@ -140,6 +140,7 @@ def simulate(
     frame_rate: float = 24.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
     regions: ArrayLike | None = None,
+    held: ArrayLike | None = None,
     **changes: Any,
 ) -> Iterator[np.ndarray]:
     """Simulate guides on a moving mesh of plain arrays: yields points (G, P, 3) float32 [m] for each pose.
@@ -148,7 +149,8 @@ def simulate(
     normals point outward; guides: `Strands` on the first pose, as from `distribute_guides`, yielded unchanged for it;
     settings: `DynamicsSettings`; changes: its fields by name; frame_rate: of the poses [1/s]; gravity: [m/s²]; regions:
     (G,) integers; no friction or pressure acts between guides of different regions, as across a parting; None for one
-    region. Raises `HairError` for invalid arguments, and during iteration for a pose with another number of vertices or
+    region; held: (G,) from 0 to 1, the part of each guide's length up to its tie, which only follows the mesh, such as
+    the attribute `gathered_held` of gathered guides; None for guides without ties. Raises `HairError` for invalid arguments, and during iteration for a pose with another number of vertices or
     non-finite ones.
 
     >>> import numpy as np
@@ -177,7 +179,18 @@ def simulate(
     mesh = mesh_of((first, triangles))
     dynamics.moving_mesh.require(mesh, guides)
     parted = None if regions is None else _regions_of(regions, len(guides))
-    return dynamics.moving_mesh.simulated(mesh, guides, remaining, wanted, 1.0 / rate, (x, y, z), regions=parted)
+    tied = None if held is None else _held_of(held, len(guides))
+    return dynamics.moving_mesh.simulated(
+        mesh, guides, remaining, wanted, 1.0 / rate, (x, y, z), regions=parted, held=tied
+    )
+
+
+def _held_of(given, guide_count):
+    """Return parts of lengths (G,) float32. Raises `HairError`."""
+    held = array_of(given, np.float32)
+    if held is None or held.shape != (guide_count,) or not ((held >= 0.0) & (held <= 1.0)).all():
+        raise HairError(f"held must be numbers from 0 to 1 of shape ({guide_count},), one for each guide.")
+    return held
 
 
 def _regions_of(given, guide_count):

@@ -151,6 +151,7 @@ def simulate(dice):
     guides = anything(dice, api.distribute_guides(mesh, guide_count=3))
     poses = anything(dice, [np.eye(3)] * 2, [np.eye(3), anything(dice, 2.0 * np.eye(3))])
     details = {"gravity": anything(dice, (0, 0, -1)), "regions": anything(dice, None, [0, 1, 1])}
+    details["held"] = anything(dice, None, [0.5, 0.0, 1.0])
     changed = changes(dice, api.DynamicsSettings, ("vertex_count", "preroll"))
     return [*api.simulate(poses, mesh[1], guides, frame_rate=anything(dice, 24), **(details | changed))]
 

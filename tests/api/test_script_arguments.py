@@ -165,6 +165,8 @@ REFUSED = {
     "infinite gravity": (lambda: simulate([np.eye(3)], gravity=(0, 0, -math.inf)), "gravity must be"),
     "regions of other guides": (lambda: simulate([np.eye(3)], regions=range(9)), "regions must be whole numbers"),
     "regions with parts": (lambda: simulate([np.eye(3)], regions=[0.5]), "regions must be whole numbers"),
+    "ties of other guides": (lambda: simulate([np.eye(3)], held=[0.5] * 9), "held must be numbers from 0 to 1"),
+    "ties behind the tip": (lambda: simulate([np.eye(3)], held=[1.5, 0.0, 0.0]), "held must be numbers from 0 to 1"),
     "a collection for arrays": (lambda: simulate([np.eye(3)], colliders="Body"), "names a collection"),
     "dynamics of another class": (lambda: simulate([np.eye(3)], settings=api.Clump()), "settings must be"),
     "plots of none": (lambda: api.bake_tables("tables", has_plots=None, size=16), "has_plots must be True or False"),

@@ -32,11 +32,12 @@ def simulated(
     device: wp.DeviceLike = None,
     *,
     regions: np.ndarray | None = None,
+    held: np.ndarray | None = None,
 ) -> Iterator[np.ndarray]:
     """Yield guides (G, P, 3) float32 [m] for each frame: first as combed, then one frame for each pose.
 
     mesh: the surface in the first frame; guides: `Strands` on it, checked by `require`; poses: (V, 3) [m] of its
-    vertices in the following frames; seconds: duration of a frame; gravity: [m/s²]; regions: as in `Simulation`. Raises
+    vertices in the following frames; seconds: duration of a frame; gravity: [m/s²]; regions, held: as in `Simulation`. Raises
     `HairError`.
     """
     surface = _Surface(mesh, guides, settings.size)
@@ -53,7 +54,7 @@ def simulated(
 
     start, seconds = surface.pose(mesh.vertices), seconds * settings.time_scale
     at_first = world(mesh.vertices, 0)
-    simulation = Simulation(settings.size * groom, scaled, start, at_first, device, regions=regions)
+    simulation = Simulation(settings.size * groom, scaled, start, at_first, device, regions=regions, held=held)
     for _ in range(settings.preroll):
         simulation.advance(start, at_first, seconds)
     yield guides.numpy().copy()

@@ -90,6 +90,24 @@ def test_guides_do_not_feel_those_of_another_region(guides):
     assert ends(7 * is_left) < 1e-5 < 1e-4 < ends(None)
 
 
+def test_guides_follow_the_mesh_up_to_their_ties(guides):
+    """The part of a guide up to its tie moves with a quick mesh as one piece with it, the rest lags behind."""
+    held, along = np.full(20, 0.5), np.linspace(0.0, 1.0, 41)
+    motions = [turned(0.15 * frame) for frame in range(1, 5)]
+    poses = [BALL.vertices, *(np.float32(motion.moved(BALL.vertices.astype(np.float64))) for motion in motions)]
+    rigid = motions[-1].moved(guides.numpy().astype(np.float64))
+
+    def apart(**changes):
+        """Return the largest distances (2,) [m] to rigid guides, before and behind the ties."""
+        found = [*api.simulate(poses, BALL.triangles, guides, vertex_count=9, bend_stiffness=1e-2, **changes)][-1]
+        distances = np.linalg.norm(found - rigid, axis=2)
+        return distances[:, along < 0.45].max(), distances[:, along > 0.6].max()
+
+    tied, free, loose = apart(held=held), apart(), apart(held=held, holds_ties=False)
+    assert tied[0] < 2e-4 < 1e-3 < tied[1]
+    assert free[0] > 1e-3 and free == loose
+
+
 def test_poses_are_read_as_they_are_asked_for(guides):
     def poses():
         yield BALL.vertices
