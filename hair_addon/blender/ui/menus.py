@@ -117,6 +117,34 @@ class VELLUS_MT_hair(bpy.types.Menu):
             layout.operator("vellus.delete_hair", icon="TRASH")
 
 
+class VELLUS_MT_hair_pie(bpy.types.Menu):
+    """Operations on hair that are needed while grooming"""
+
+    bl_label = "Hair"
+    bl_idname = "VELLUS_MT_hair_pie"
+    bl_translation_context = CONTEXT
+
+    @classmethod
+    def poll(cls, context):
+        return surface_of(getattr(context, "object", None)) is not None
+
+    def draw(self, context):
+        pie = self.layout.menu_pie()
+        if guides_of(context.object) is None:
+            pie.operator("vellus.add_hair", icon="OUTLINER_OB_CURVES")
+            return
+        is_combing = context.mode == "SCULPT_CURVES"
+        # On the left; the order is that of Blender's pie menus.
+        pie.operator("vellus.comb_guides", text="Stop Combing" if is_combing else "Comb Guides", icon="SCULPTMODE_HLT")
+        pie.menu("VELLUS_MT_guide_tools", icon="OUTLINER_OB_CURVES")
+        pie.operator("vellus.freeze_selected", icon="FREEZE")
+        pie.operator("vellus.select_hair", icon="RESTRICT_SELECT_OFF")
+        pie.operator("vellus.select_guides", icon="RESTRICT_SELECT_OFF")
+        pie.operator_menu_enum("vellus.add_style", "style", icon="ADD")
+        pie.operator("vellus.unfreeze_all")
+        pie.operator("vellus.toggle_drawing", icon="HIDE_OFF")
+
+
 def _in_add_menu(menu, _context):
     menu.layout.separator()
     menu.layout.operator("vellus.add_hair", text="Hair System", icon="OUTLINER_OB_CURVES")
@@ -162,7 +190,7 @@ _ENTRIES = (
     ("VIEW3D_MT_edit_curves_context_menu", _in_curves_menu),
 )
 
-CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_unlocked_render, VELLUS_MT_refused_hair)
+CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_hair_pie, VELLUS_MT_unlocked_render, VELLUS_MT_refused_hair)
 
 
 def register():

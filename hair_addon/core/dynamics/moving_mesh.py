@@ -37,8 +37,8 @@ def simulated(
     """Yield guides (G, P, 3) float32 [m] for each frame: first as combed, then one frame for each pose.
 
     mesh: the surface in the first frame; guides: `Strands` on it, checked by `require`; poses: (V, 3) [m] of its
-    vertices in the following frames; seconds: duration of a frame; gravity: [m/s²]; regions, held: as in `Simulation`. Raises
-    `HairError`.
+    vertices in the following frames; seconds: duration of a frame; gravity: [m/s²]; regions, held: as in `Simulation`.
+    Raises `HairError`.
     """
     surface = _Surface(mesh, guides, settings.size)
     groom = guides.numpy().astype(np.float64)

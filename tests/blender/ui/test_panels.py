@@ -14,7 +14,7 @@ from mathutils import Matrix
 from hair_addon.blender.data import scene
 from hair_addon.blender.host import running
 from hair_addon.blender.settings import fitted_sizes, picture_choices, properties, saved_looks, setting_properties
-from hair_addon.blender.ui import look_previews, menus, panels
+from hair_addon.blender.ui import keymap, look_previews, menus, panels
 from hair_addon.blender.ui.panels import tab
 from hair_addon.core.grooming import cost
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
@@ -311,6 +311,61 @@ def test_a_right_click_offers_hair(hair, menu, active, entry):
         layout = Layout()
         ours(SimpleNamespace(layout=layout), Context())
         assert list(layout.drawn) == wanted
+
+
+@pytest.mark.parametrize("active", ["Hair", "Guides", "Sphere"])
+def test_the_pie_menu_offers_grooming(hair, active):
+    """The pie menu has eight entries on hair, its guides and its surface, and one on a bare mesh; none elsewhere."""
+    make_active(active)
+    drawn = draw(menus.VELLUS_MT_hair_pie).drawn
+    assert drawn.total() == 8 and drawn["vellus.comb_guides"] == drawn["VELLUS_MT_guide_tools"] == 1
+    bpy.ops.mesh.primitive_plane_add()
+    assert list(draw(menus.VELLUS_MT_hair_pie).drawn) == ["vellus.add_hair"]
+    bpy.ops.object.camera_add()
+    assert draw(menus.VELLUS_MT_hair_pie) is None
+
+
+class Keymaps:
+    """A key configuration of keymaps by name, as an add-on extends it."""
+
+    def __init__(self):
+        self.found = {"Object Mode": [SimpleNamespace(idname="wm.call_menu_pie", properties=SimpleNamespace(name="X"))]}
+
+    def new(self, name, **_details):
+        items = self.found.setdefault(name, [])
+
+        def add(idname, *_event, **_modifiers):
+            items.append(SimpleNamespace(idname=idname, properties=SimpleNamespace(name="")))
+            return items[-1]
+
+        return SimpleNamespace(keymap_items=SimpleNamespace(new=add))
+
+    def __iter__(self):
+        for items in self.found.values():
+            yield SimpleNamespace(keymap_items=Items(items))
+
+
+class Items:
+    def __init__(self, items):
+        self._items = items
+
+    def __iter__(self):
+        return iter(self._items)
+
+    def remove(self, item):
+        self._items.remove(item)
+
+
+def test_the_shortcut_of_the_pie_menu_is_removed_with_the_add_on(monkeypatch):
+    """Registering adds a shortcut that names the pie menu to each mode; unregistering leaves those of others."""
+    keymaps = Keymaps()
+    manager = SimpleNamespace(keyconfigs=SimpleNamespace(addon=SimpleNamespace(keymaps=keymaps)))
+    monkeypatch.setattr(keymap, "bpy", SimpleNamespace(context=SimpleNamespace(window_manager=manager)))
+    keymap.register()
+    pies = [item.properties.name for items in keymaps.found.values() for item in items if "pie" in item.idname]
+    assert sorted(pies) == ["VELLUS_MT_hair_pie"] * 3 + ["X"] and hasattr(bpy.types, keymap.PIE)
+    keymap.unregister()
+    assert [item.properties.name for items in keymaps.found.values() for item in items] == ["X"]
 
 
 REDO = {

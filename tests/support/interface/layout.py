@@ -25,7 +25,7 @@ class Layout:
     def _part(self, align=False):
         return Layout(self)
 
-    column = box = _part
+    column = box = menu_pie = _part
 
     def row(self, align=False):
         part = self._part()
