@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Guides as antialiased lines of constant width in one color, or each in its own, as the report's locator. Frozen points
+// Guides as antialiased lines of constant width in one color, each in its own, or in a hue that is given. Frozen points
 // are faded.
 
 #include "visibility/unclipped.glsl"
@@ -30,13 +30,29 @@ vec3 hue(float turn)
   return clamp(abs(fract(turn + vec3(0.0, 2.0 / 3.0, 1.0 / 3.0)) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
 }
 
+// The color of a guide. A hue in `hues` below zero stands for the common color.
+vec3 color_of_guide()
+{
+  if (color_source == 0) {
+    return line_color.rgb;
+  }
+  // Steps of the golden ratio give neighboring indices distinct hues.
+  float turn = float(strand_index) * 0.61803399;
+  if (color_source == 2) {
+    int width = textureSize(hues, 0).x;
+    turn = texelFetch(hues, ivec2(strand_index % width, strand_index / width), 0).r;
+    if (turn < 0.0) {
+      return line_color.rgb;
+    }
+  }
+  return mix(vec3(1.0), hue(fract(turn)), 0.75);
+}
+
 void main()
 {
   if (IS_CLIPPED && is_cut_off(drawn_position)) {
     discard;
   }
-  // Steps of the golden ratio give neighboring indices distinct hues.
-  vec3 own = mix(vec3(1.0), hue(fract(float(strand_index) * 0.61803399)), 0.75);
   float away = 0.5 * strip_width * abs(strand_side_place);  // from the axis [pixels]
   float half_line = 0.5 * strip_width - 1.0;
   float line = clamp(half_line - away, 0.0, 1.0);
@@ -44,5 +60,5 @@ void main()
   float coverage = line + (1.0 - line) * fringe;
   float shown = line / max(coverage, 1e-6);  // the part that is not dark
   coverage *= mix(1.0, FROZEN_OPACITY, frozen_part());
-  color = vec4((is_own_color != 0 ? own : line_color.rgb) * shown, coverage * line_color.a);
+  color = vec4(color_of_guide() * shown, coverage * line_color.a);
 }

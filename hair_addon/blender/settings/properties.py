@@ -247,6 +247,8 @@ class VellusCurves(bpy.types.PropertyGroup):
             ("PLAIN", "Plain", "One muted color for all guides"),
             ("SYSTEM", "Hair System", "One color for the guides of each hair system"),
             ("GUIDE", "Guide", "A different color for each guide"),
+            ("LENGTH", "Length", "From blue for the shortest guide to red for the longest one"),
+            ("TIE", "Tie", "One color for the gathered guides of each tie or row; others are plain"),
         ],
         default="PLAIN",
         update=mark_shown,

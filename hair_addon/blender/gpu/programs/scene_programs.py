@@ -65,9 +65,10 @@ def guide_program(is_clipped=False):
     replaced = _strip(info, (), is_clipped)
     info.push_constant("VEC4", "line_color")
     info.push_constant("FLOAT", "strip_width")
-    info.push_constant("INT", "is_own_color")
+    info.push_constant("INT", "color_source")
     info.push_constant("INT", "frozen_places")
-    info.sampler(len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS), "FLOAT_2D", "frozen")
+    for slot, name in enumerate(("frozen", "hues"), start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "strands/strip.vert", "strands/guides.frag", COLOR, replaced)
 
 

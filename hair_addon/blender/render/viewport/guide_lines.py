@@ -10,8 +10,9 @@ import bpy
 import numpy as np
 
 from ....core.errors import HairError
+from ....core.geometry import strands
 from ...data import scene
-from ...data.strands import curves, frozen_points
+from ...data.strands import curves, frozen_points, gathered_groups
 from ...gpu import drawing, strand_textures
 from ...gpu.programs import scene_programs, uniforms
 from ...host.notices import name_of
@@ -22,6 +23,8 @@ _LINE_WIDTH = 1.25  # [pixels]
 _FRINGE = 3.0  # [pixels]: antialiasing and a dark edge on both sides, as in strands/guides.frag
 FROZEN_PLACES = 32  # of a guide at which the viewport knows whether it is frozen
 _PLAIN = (0.72, 0.86, 1.0)
+_SHORT_HUE = 2.0 / 3.0  # blue; 0 is red
+_GOLDEN = 0.61803399  # steps that give neighboring numbers distinct hues
 
 
 def shown(context) -> list:
@@ -49,10 +52,12 @@ def draw(guide_object, view, lights, clip_planes):
     program.bind()
     program.uniform_float("line_color", (*_color_of(guide_object.data), state.guide_opacity))
     program.uniform_float("strip_width", strip_width())
-    program.uniform_int("is_own_color", int(state.guide_colors == "GUIDE"))
+    hues = _hues_texture(guide_object.data)
+    program.uniform_int("color_source", int(state.guide_colors == "GUIDE") if hues is None else 2)
     frozen = _frozen_texture(guide_object.data)
     program.uniform_int("frozen_places", 0 if frozen is None else FROZEN_PLACES)
-    samplers = {"frozen": guides.texture if frozen is None else frozen}
+    given = {"frozen": frozen, "hues": hues}
+    samplers = {name: guides.texture if texture is None else texture for name, texture in given.items()}
     record = drawing.strand_record(guides, view, np.array(guide_object.matrix_world, np.float64))
     record["thickness"] = 0.0  # lines of constant width
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA"):
@@ -71,6 +76,35 @@ def _frozen_texture(guides):
     steps = np.rint(np.linspace(0.0, 1.0, FROZEN_PLACES) * np.maximum(counts - 1, 0)[:, None]).astype(np.int64)
     values = are_frozen[np.minimum(starts[:, None] + steps, len(are_frozen) - 1)]
     return strand_textures.numbers_texture(values.ravel(), min(strand_textures.TEXTURE_WIDTH, values.size))
+
+
+def _hues_texture(guides):
+    """Return a texture with the hue of each guide; None if the colors of guides are not those of numbers."""
+    find = _HUES.get(guides.vellus.guide_colors)
+    if find is None or not len(guides.curves):
+        return None
+    values = find(guides)
+    return strand_textures.numbers_texture(values, min(strand_textures.TEXTURE_WIDTH, len(values)))
+
+
+def _hues_of_lengths(guides):
+    """Return hues (G,) from blue for the shortest guide to red for the longest one; green if all are as long."""
+    starts, points = curves.curve_offsets(guides), curves.read_points(guides)
+    lengths = strands.ragged_lengths(points, starts)
+    least, most = lengths.min(), lengths.max()
+    part = np.full(len(lengths), 0.5) if most - least <= 1e-4 * most else (lengths - least) / (most - least)
+    return _SHORT_HUE * (1.0 - part)
+
+
+def _hues_of_ties(guides):
+    """Return hues (G,) of the ties and locks of gathered guides; -1 for the others, which have the plain color."""
+    gathered = gathered_groups.read(guides)
+    if gathered is None:
+        return np.full(len(guides.curves), -1.0)
+    return np.where(gathered.groups > 0, gathered.groups * _GOLDEN % 1.0, -1.0)
+
+
+_HUES = {"LENGTH": _hues_of_lengths, "TIE": _hues_of_ties}
 
 
 def _color_of(guides):

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import frozen_points
+from hair_addon.blender.data.strands import curves, frozen_points, gathered_groups
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import guide_lines
+from hair_addon.core.geometry.strands import ragged_lengths
+from tests.support.reading import write_points
 
 SIZE = 128
 LEVEL = 2.0  # of the background
@@ -97,6 +99,42 @@ def test_frozen_points_are_drawn_faded(upright, part):
     np.testing.assert_allclose(upper, 0.25 if part == 1.0 else 1.0, atol=0.03)
     frozen_points.write(upright.data, np.zeros(len(are_frozen), bool))
     np.testing.assert_allclose(LEVEL - read(upright), before, atol=1e-6)
+
+
+def test_guides_are_colored_by_their_length(guides):
+    """The shortest guides are blue and the longest ones red; guides of one length are green, whatever the length is."""
+    guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "LENGTH"
+    points, starts = curves.read_points(guides.data), curves.curve_offsets(guides.data)
+    roots = np.repeat(points[starts[:-1]], np.diff(starts), axis=0)
+    unit = points - roots
+    sizes = ragged_lengths(points, starts)
+    unit /= np.repeat(sizes, np.diff(starts))[:, None]
+
+    def mean_color(lengths):
+        write_points(guides, roots + np.repeat(lengths, np.diff(starts))[:, None] * unit)
+        picture = read(guides)
+        seen = picture[np.ptp(picture, axis=-1) > 0.02]
+        return seen.mean(axis=0) / seen.mean()
+
+    count, length = len(starts) - 1, sizes.mean()
+    straight = mean_color(np.full(count, length))
+    assert straight[1] > straight[[0, 2]].max()
+    is_long = np.arange(count) < 1
+    mostly_short = mean_color(length * np.where(is_long, 1.0, 0.9))
+    mostly_long = mean_color(length * np.where(is_long, 0.9, 1.0))
+    assert mostly_short[2] > mostly_short[0] and mostly_long[0] > mostly_long[2]
+
+
+def test_guides_of_a_tie_share_a_color(guides):
+    """Gathered guides have a color for each tie, others the plain one."""
+    guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "PLAIN"
+    plain = read(guides)
+    guides.data.vellus.guide_colors = "TIE"
+    np.testing.assert_array_equal(read(guides), plain)
+    count = len(guides.data.curves)
+    groups = np.arange(count) % 3
+    gathered_groups.write(guides.data, gathered_groups.Gathered(groups, np.zeros(count, np.float32)))
+    assert len(hues(plain)) < len(hues(read(guides))) and abs(read(guides) - plain).max() > 0.05
 
 
 def hues(picture):
