@@ -35,7 +35,7 @@ WHITE = (0.75, 0.70, 0.62)
 
 
 def main():
-    """Draw the requested pictures, all by default; a sheet is written only if all were drawn."""
+    """Draw the requested pictures, all by default; pictures of a part of a sheet are written as NAME.png."""
     names = [name for rows in SHEETS.values() for name in rows]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all by default")
@@ -47,10 +47,12 @@ def main():
     hair_addon.register()
     gpu.init()
     for file, makers in SHEETS.items():
-        asked = [make for name, make in makers.items() if name in (given.names or names)]
-        if asked:
-            rows = [row(make, given) for make in asked]
-            picture_files.write(np.concatenate(rows), (given.folder / file).resolve())
+        rows = {name: row(make, given) for name, make in makers.items() if name in (given.names or names)}
+        if len(rows) == len(makers):
+            picture_files.write(np.concatenate([*rows.values()]), (given.folder / file).resolve())
+        else:
+            for name, drawn in rows.items():
+                picture_files.write(drawn, (given.folder / f"{name}.png").resolve())
 
 
 def row(make, given):
@@ -67,33 +69,37 @@ def row(make, given):
 
 def tiger(strands):
     """Return a coat of stripes on the monkey, with a cream muzzle."""
-    monkey = fur_grooms.build()
-    hair = fur_grooms.short_fur(monkey, int(60_000 * strands))
-    project_from_the_front(monkey)
-    look = hair.vellus.appearance
-    look.parametrization, look.color, look.tip_absorption, look.random_color = "COLOR", ORANGE, 0.8, 0.05
+    hair = furred_monkey(strands, ORANGE)
     colors = stripes()
     paint(hair, "look.color", "IMAGE", lambda item: fill(item.image, colors))
-    see("Short Fur", 176.0, (0.38, -1.40, 0.76))
     return framed(encoded(colors[::-1]))
 
 
 def calico(strands):
     """Return a coat of white, orange and black patches on the monkey, by a color ramp of a painted mask."""
-    monkey = fur_grooms.build()
-    hair = fur_grooms.short_fur(monkey, int(60_000 * strands))
-    project_from_the_front(monkey)
-    look = hair.vellus.appearance
-    look.parametrization, look.color, look.tip_absorption, look.random_color = "COLOR", WHITE, 0.9, 0.05
+    hair = furred_monkey(strands, WHITE)
     item = begin_map(hair, "look.color", "IMAGE")
     bpy.ops.vellus.add_map_ramp(setting="look.color")
-    stops = ((0.0, WHITE), (0.25, ORANGE), (0.75, BLACK))
+    stops = ((0.0, WHITE), (0.2, WHITE), (0.35, ORANGE), (0.6, ORANGE), (0.8, BLACK))
     words = (f"{position}:{'/'.join(map(str, color))}" for position, color in stops)
-    map_items.set_ramp(item, " ".join(["constant", *words]))
+    map_items.set_ramp(item, " ".join(words))
     masks = np.repeat(patches()[..., None], 3, axis=2)
     paint(hair, "look.color", "IMAGE", lambda item: fill(item.image, masks))
-    see("Short Fur", 176.0, (0.38, -1.40, 0.76))
     return framed(encoded(masks[::-1]))
+
+
+def furred_monkey(strands, color):
+    """Return short fur of a color on the monkey, so dense that it hides the skin, with UVs, light and camera from the
+    front.
+    """
+    monkey = fur_grooms.build()
+    hair = fur_grooms.short_fur(monkey, int(160_000 * strands))
+    hair.vellus.hair.radius = 1.4e-4 / strands  # [m]
+    project_from_the_front(monkey)
+    look = hair.vellus.appearance
+    look.parametrization, look.color, look.tip_absorption, look.random_color = "COLOR", color, 0.85, 0.05
+    see("Short Fur", 176.0, (0.38, -1.40, 0.76))
+    return hair
 
 
 def thin_brows(strands):
@@ -241,13 +247,19 @@ def stripes():
 
 
 def patches():
-    """Masks (TEXELS, TEXELS) of a calico cat seen from the front, 0, 0.5 and 1, the bottom row first."""
+    """Masks (TEXELS, TEXELS) of a calico cat from the front, the bottom row first: 0 white, 0.5 orange, 1 black."""
     v, u = np.mgrid[-1.0 : 1.0 : TEXELS * 1j, -1.0 : 1.0 : TEXELS * 1j]
-    wave = np.sin(4.1 * u + 1.7 * np.sin(3.0 * v) + 0.4) + np.sin(3.3 * v - 2.0 * u + 1.1)
-    other = np.sin(5.0 * u - 2.6 * v + 2.0) + np.sin(2.7 * v + 1.9 * u)
-    found = np.where(wave > 0.35, np.where(other > 0.1, 1.0, 0.5), 0.0)
-    is_white = ((u / 0.22) ** 2 + ((v + 0.6) / 0.42) ** 2 < 1.0) | (np.abs(u) < 0.07)
-    return np.where(is_white, 0.0, found)
+    ragged = 0.05 * np.sin(9.0 * u + 3.0 * np.sin(7.0 * v)) + 0.035 * np.sin(17.0 * v + 4.0 * u)
+
+    def patch(x, z, width, height):
+        away = np.hypot((u - x) / width, (v - z) / height) + ragged
+        return 1.0 - part(away, 0.85, 1.05)
+
+    orange = np.maximum.reduce(
+        [patch(0.42, 0.55, 0.38, 0.55), patch(-0.85, 0.0, 0.3, 0.4), patch(0.32, -0.62, 0.2, 0.25)]
+    )
+    black = np.maximum.reduce([patch(-0.34, 0.5, 0.34, 0.6), patch(0.92, 0.15, 0.3, 0.4), patch(-0.3, -0.5, 0.18, 0.2)])
+    return np.maximum(0.5 * orange, black)
 
 
 def encoded(colors):
