@@ -76,6 +76,9 @@ def run(given, console):
     without = blender.io.pictures.frames.missing_files(numbers, given.allow_missing)
     if without:
         console.warn(without)
+    if given.engine == "vellus":
+        for sentence, values in blender.data.pictures.unread_nodes.sentences(blender.host.scene_time.present_scene()):
+            console.warn(sentence.format(**values))
     settings = _frame_settings(given, blender.io.pictures.frames.scene_size())
     if given.dry_run:
         _plan(given, console, numbers, settings)

@@ -88,11 +88,10 @@ def _color(light):
     color = np.array(light.color)
     if light.use_temperature:
         color = color * light.temperature_color
-    nodes = light.node_tree.nodes if light.node_tree else ()
-    emission = next((node for node in nodes if node.type == "EMISSION"), None)
+    emission = shown_shader(light.node_tree, ["EMISSION"])
     if emission is None:
         return color
-    return color * emission.inputs["Color"].default_value[:3] * emission.inputs["Strength"].default_value
+    return color * emission["Color"].value()[:3] * emission["Strength"].value()
 
 
 def _emitting_area(light, matrix):

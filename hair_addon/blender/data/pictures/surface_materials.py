@@ -126,6 +126,24 @@ _READERS = {
     "BSDF_TRANSPARENT": _read_transparent,
 }
 
+# {type of shader: its inputs that are read}.
+READ = {
+    "BSDF_PRINCIPLED": (
+        "Base Color",
+        "Roughness",
+        "Metallic",
+        "IOR",
+        "Specular IOR Level",
+        "Normal",
+        "Transmission Weight",
+        "Alpha",
+    ),
+    "BSDF_DIFFUSE": ("Color",),
+    "BSDF_GLASS": ("IOR", "Roughness"),
+    "BSDF_REFRACTION": (),
+    "BSDF_TRANSPARENT": (),
+}
+
 
 def _reflectance(refractive_index, level):
     """Reflectance at normal incidence; level: a factor, 1 at ½."""

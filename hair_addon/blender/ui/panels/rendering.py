@@ -5,7 +5,7 @@ import bpy
 from bl_ui import properties_view_layer
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
-from ...data.pictures import world_panoramas
+from ...data.pictures import unread_nodes, world_panoramas
 from ...render import data_passes, mattes
 from ...render.frames.engine import NAME
 from ...render.viewport import live_light
@@ -40,6 +40,8 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
             write(self.layout, context, sentence, "INFO")
         for sentence in world_panoramas.sentences():
             write(self.layout, context, sentence, "INFO")
+        for sentence, values in unread_nodes.sentences(context.scene):
+            write(self.layout, context, interface_text(sentence, **values), "INFO")
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):

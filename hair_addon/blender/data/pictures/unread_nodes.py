@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nodes of lights and of surfaces' materials that Vellus does not read, for sentences in panels and commands."""
+
+from ...host.notices import name_of
+from . import surface_materials
+from .shader_sockets import ShaderInput
+
+_MOST = 3  # names in a sentence
+_OF_LIGHTS = (
+    "Nodes of lights have no effect in Vellus, except Color and Strength of an Emission node, as values: {names}."
+)
+_OF_MATERIALS = (
+    "Nodes of materials have no effect on surfaces in Vellus, except a shader's values and image textures: {names}."
+)
+
+
+def sentences(scene):
+    """Return [(sentence, values)] about lights and materials of objects that a scene renders, at most one of each."""
+    objects = [one for one in scene.objects if not one.hide_render]
+    lights = {one.data for one in objects if one.type == "LIGHT"}
+    materials = {slot.material for one in objects if one.type == "MESH" for slot in one.material_slots}
+    found = (
+        (_OF_LIGHTS, {light: _unread_of(light.node_tree, {"EMISSION": ("Color", "Strength")}, ()) for light in lights}),
+        (
+            _OF_MATERIALS,
+            {one: _unread_of(one.node_tree, surface_materials.READ, _IMAGES) for one in materials if one is not None},
+        ),
+    )
+    return [(text, {"names": _listed(unread)}) for text, unread in found if any(unread.values())]
+
+
+_IMAGES = ("TEX_IMAGE", "NORMAL_MAP", "SEPARATE_COLOR")
+
+
+def _unread_of(tree, read, textures):
+    """Return the labels of nodes before a tree's output that are not read.
+
+    read: {type of shader: its inputs that are read}; textures: types of other nodes that are read.
+    """
+    output = None if tree is None else tree.get_output_node("ALL")
+    if output is None:
+        return []
+    shader = ShaderInput(output.inputs["Surface"]).source()[0]
+    if shader is None:
+        return []
+    if shader.type not in read:
+        return [shader.node.bl_label]
+    return [label for name in read[shader.type] for label in _before(shader[name], textures)]
+
+
+def _before(shader_input, textures):
+    """Return the label of the node that an input reads, unless it is a constant or of types that are read."""
+    node = shader_input.source()[0]
+    if node is None or node.type in {"RGB", "VALUE", *textures}:
+        return []
+    return [node.node.bl_label]
+
+
+def _listed(unread):
+    """Return the names of datablocks with their unread nodes, as text."""
+    named = sorted((name_of(one), list(dict.fromkeys(labels))) for one, labels in unread.items() if labels)
+    texts = [f'"{name}" ({", ".join(labels)})' for name, labels in named]
+    return ", ".join(texts[:_MOST]) + ("…" if len(texts) > _MOST else "")

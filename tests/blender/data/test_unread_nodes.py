@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Nodes of lights and materials without effect are named in the panel and by `vellus render`, all others are read."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data.pictures import unread_nodes
+from hair_addon.blender.gpu import lights
+from hair_addon.blender.render.frames.engine import NAME
+from tests.support.commands import run_here
+from tests.support.interface.layout import draw
+
+
+@pytest.fixture
+def lamp(scene):
+    """Return a point light with nodes, and its Emission node."""
+    bpy.ops.object.light_add(type="POINT")
+    light = bpy.context.object.data
+    return light, next(node for node in light.node_tree.nodes if node.type == "EMISSION")
+
+
+@pytest.fixture
+def painted(scene):
+    """Return the material of a mesh, and its Principled BSDF."""
+    bpy.ops.mesh.primitive_plane_add()
+    material = bpy.data.materials.new("Skin")
+    bpy.context.object.data.materials.append(material)
+    return material, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+
+
+def link(tree, kind, target):
+    node = tree.nodes.new(kind)
+    tree.links.new(node.outputs[0], target)
+    return node
+
+
+def told():
+    return [text.format(**values) for text, values in unread_nodes.sentences(bpy.context.scene)]
+
+
+def record():
+    (found,), _links = lights.read_lights(bpy.context.evaluated_depsgraph_get(), True)
+    return found
+
+
+def test_constant_nodes_of_lights_are_read_without_a_sentence(lamp):
+    """An RGB node before Emission has the effect of its color, and no sentence."""
+    light, emission = lamp
+    emission.inputs["Color"].default_value = (0.25, 0.5, 1.0, 1.0)
+    plain = record()
+    node = link(light.node_tree, "ShaderNodeRGB", emission.inputs["Color"])
+    node.outputs[0].default_value = (0.25, 0.5, 1.0, 1.0)
+    emission.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    assert told() == []
+    for name in plain.dtype.names:
+        np.testing.assert_array_equal(record()[name], plain[name], err_msg=name)
+
+
+def test_other_nodes_of_lights_are_named(lamp):
+    light, emission = lamp
+    link(light.node_tree, "ShaderNodeBlackbody", emission.inputs["Color"])
+    link(light.node_tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
+    (sentence,) = told()
+    assert sentence.endswith(f'as values: "{light.name}" (Blackbody, Light Falloff).')
+    bpy.context.object.hide_render = True
+    assert told() == []
+
+
+def test_procedural_materials_are_named_and_images_are_not(painted):
+    material, shader = painted
+    assert told() == []
+    link(material.node_tree, "ShaderNodeTexImage", shader.inputs["Base Color"])
+    assert told() == []
+    link(material.node_tree, "ShaderNodeTexNoise", shader.inputs["Base Color"])
+    (sentence,) = told()
+    assert '"Skin" (Noise Texture)' in sentence
+    output = material.node_tree.get_output_node("ALL")
+    link(material.node_tree, "ShaderNodeBsdfToon", output.inputs["Surface"])
+    assert '"Skin" (Toon BSDF)' in told()[0]
+
+
+def test_panel_and_command_line_name_them(painted, tmp_path):
+    material, shader = painted
+    link(material.node_tree, "ShaderNodeTexNoise", shader.inputs["Base Color"])
+    bpy.ops.object.camera_add()
+    bpy.context.scene.camera = bpy.context.object
+    bpy.context.scene.render.engine = NAME
+    assert any("(Noise Texture)" in text for text in draw(bpy.types.VELLUS_PT_sampling).texts)
+    path = tmp_path / "a.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    ended = run_here("render", path, "--out", tmp_path / "a.png", "--dry-run")
+    assert ended.status == 0 and '"Skin" (Noise Texture)' in ended.errors
