@@ -63,11 +63,11 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     indices, weights, apart = _weights(surface, before, roots)
     layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
     layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
-    gathered = None if before.gathered is None else before.gathered[np.maximum(indices[:, 0], 0)]
-    gathered_groups.write(guides, gathered)
     guides.vellus.is_base_grown = True
     recording.note_shown(guides, before.depsgraph)
     recording.show(guides, guide_layers.composed(recording.read(guides, before.depsgraph)))
+    gathered = None if before.gathered is None else before.gathered[np.maximum(indices[:, 0], 0)]
+    gathered_groups.write(guides, gathered)
 
 
 def between(surface: Surface, before: LayersBefore, roots: SurfacePoints, base: np.ndarray) -> GuideLayers:

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data.strands import simulated_guides
+from hair_addon.blender.data.strands import gathered_groups, simulated_guides
 from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.following import update
 from tests.support.dynamics.swung import simulate
+from tests.support.exchange.imported import select
 from tests.support.reading import points
 
 TAIL = ((0.0, 0.6, 0.8), (0.0, 0.9, 1.1), (0.0, 1.3, 0.6), (0.0, 1.3, -1.0))
@@ -80,3 +82,39 @@ def test_the_setting_releases_hair(tied):
     combed = points(tied)
     apart = np.linalg.norm(shown_at(tied, 7) - combed, axis=2)
     assert apart[before_ties(tied, combed)].max() > 0.01
+
+
+def held_lengths(guides):
+    """Return (parts (G,) of the lengths up to ties, lengths (G,) of guides) in the world."""
+    placed = points(guides) * np.array(guides.matrix_world.to_scale())
+    lengths = np.linalg.norm(np.diff(placed, axis=1), axis=2).sum(axis=1)
+    return gathered_groups.read(guides.data).held, lengths
+
+
+def test_hair_is_held_up_to_its_tie_after_it_is_cut(tied):
+    """Guides that are cut behind their ties are held at the same place; guides cut before them are held as a whole."""
+    before, lengths = held_lengths(tied)
+    is_behind = before < 1.0
+    cut = float(np.median((before * lengths)[is_behind]))
+    api.change_guides(tied, "LENGTH", method="MAXIMUM", length=cut)
+    now, shorter = held_lengths(tied)
+    expected = np.minimum(before * lengths / shorter, 1.0)
+    np.testing.assert_allclose(now[is_behind], expected[is_behind], atol=2e-3)
+    assert 0 < (expected[is_behind] == 1.0).sum() < is_behind.sum() and abs(now - before)[is_behind].max() > 0.1
+    np.testing.assert_array_equal(now[~is_behind], 1.0)
+
+
+@pytest.mark.parametrize("scale", [0.01, 3.0])
+def test_hair_is_held_up_to_its_tie_after_a_scale_is_applied(tied, scale):
+    before, lengths = held_lengths(tied)
+    head = bpy.data.objects["Sphere"]
+    head.animation_data_clear()
+    head.scale = (scale, scale, scale)
+    bpy.context.view_layer.update()
+    select(head)
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    update()
+    guides = bpy.data.objects["Guides"]
+    now, longer = held_lengths(guides)
+    np.testing.assert_allclose(longer, scale * lengths, rtol=1e-3)
+    np.testing.assert_allclose(now, before, atol=1e-4)

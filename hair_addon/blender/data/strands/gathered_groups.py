@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gathered guides: attributes of their groups, equal for guides of one tie or lock, and of the part up to the tie."""
+"""Gathered guides: attributes of their groups, equal for guides of one tie or lock, and of the part up to the tie.
+
+The length of this part is stored too, in local units, because guides may be cut or lengthened behind their ties.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from . import attributes
+from ....core import geometry
+from . import attributes, curves
 
 NAME = "gathered"
 HELD = "gathered_held"
-_TYPES = ((NAME, "INT"), (HELD, "FLOAT"))
+_LENGTH = "gathered_length"  # up to the tie, in local units
+_TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (_LENGTH, "FLOAT"))
 
 
 @dataclass(frozen=True)
 class Gathered:
-    """groups (G,) int32: 0 for guides that are not gathered; held (G,) float32: part of the length up to the tie."""
+    """groups (G,) int32: 0 for guides that are not gathered; held (G,) float32: part of the present length up
+    to the tie.
+    """
 
     groups: np.ndarray
     held: np.ndarray
@@ -30,11 +37,17 @@ def read(datablock):
         return None
     held = attributes.read(datablock, HELD, "FLOAT", "CURVE")
     held = np.zeros(len(groups), np.float32) if held is None else np.clip(np.nan_to_num(held), 0.0, 1.0)
+    length = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
+    if length is not None:
+        held = np.where(held < 1.0, np.clip(np.nan_to_num(length) / _lengths(datablock), 0.0, 1.0), held)
     return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32))
 
 
 def write(datablock, gathered):
-    """Store the `Gathered` of guides; the attributes are removed if it is None or no guide is gathered."""
+    """Store the `Gathered` of guides with their present lengths; the attributes are removed if no guide is gathered.
+
+    gathered: None for no gathered guides.
+    """
     is_any = gathered is not None and gathered.groups.any()
     for name, data_type in _TYPES:
         present = datablock.attributes.get(name)
@@ -43,6 +56,20 @@ def write(datablock, gathered):
     if is_any:
         attributes.write(datablock, NAME, "INT", "CURVE", gathered.groups.astype(np.int32))
         attributes.write(datablock, HELD, "FLOAT", "CURVE", gathered.held.astype(np.float32))
+        attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", gathered.held * _lengths(datablock))
+
+
+def scale(datablock, change):
+    """Scale the stored lengths up to ties as an `Affine` of the local coordinates scales widths."""
+    lengths = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
+    if lengths is not None and len(lengths):
+        attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", change.widths(lengths))
+
+
+def _lengths(datablock):
+    """Return the lengths (G,) float64 of guides, at least a tiny one."""
+    points, starts = curves.read_points(datablock), curves.curve_offsets(datablock)
+    return np.maximum(geometry.strands.ragged_lengths(np.nan_to_num(points), starts), 1e-30)
 
 
 def add(datablock, gathered):

@@ -19,6 +19,7 @@ from ...data.strands import (
     curves,
     curves_objects,
     delivered_hair,
+    gathered_groups,
     kept_shapes,
     simulated_guides,
     stored_roots,
@@ -288,6 +289,7 @@ def _tolerance(surface):
 def _widen(strands, change):
     """Scale the widths and distances that strands store in local units."""
     curves.widen(strands, change)
+    gathered_groups.scale(strands, change)
     apart = attributes.read(strands, "root_distance", "FLOAT", "CURVE")
     if apart is not None:
         attributes.write(strands, "root_distance", "FLOAT", "CURVE", change.widths(apart))

@@ -10,7 +10,15 @@ from ....core.errors import HairError
 from ....core.geometry.affine import Affine
 from ....core.geometry.mesh import positions
 from ...data import scene, surface_space, usable_surfaces
-from ...data.strands import attributes, curves, curves_objects, kept_shapes, posed_strands, stored_roots
+from ...data.strands import (
+    attributes,
+    curves,
+    curves_objects,
+    gathered_groups,
+    kept_shapes,
+    posed_strands,
+    stored_roots,
+)
 from ...data.surfaces import Surface
 from ...host.notices import name_of
 from .. import bindings, staleness
@@ -110,6 +118,7 @@ class _Carried:
         """Write points, kept shapes, widths and roots."""
         kept_shapes.move(self._part, self._moved)
         curves.widen(self._part, self._change)
+        gathered_groups.scale(self._part, self._change)
         if curves.is_hand_made(self._part):
             attributes.write(self._part, "root_distance", "FLOAT", "CURVE", self._apart / surface.scale)
         curves.write_roots(self._part, surface, self._roots)
