@@ -113,6 +113,7 @@ class Settings(ProfiledSettings):
         soft_high=0.2,
         unit="LENGTH",
         subtype="DISTANCE",
+        may_vary=True,
     )
     keep_length: float = param(
         1.0,

@@ -23,7 +23,7 @@ CASES = {
     "hands of curls": (
         curl.Settings(),
         (),
-        {"pitch_vary": (0.0, 0.6), "stretch": (0.0, 1.5), "left_handed": (0.0, 0.9)},
+        {"pitch_vary": (0.0, 0.6), "stretch": (0.0, 1.5), "left_handed": (0.0, 0.9), "switchback": (0.0, 0.02)},
     ),
     "frizz": (frizz.Settings(octaves=3), (), {"amplitude": (0.002, 0.005), "wavelength": (0.02, 0.07)}),
     "coherent frizz": (frizz.Settings(), (), {"coherence": (0.0, 0.8), "spread": (0.02, 0.05)}),

@@ -107,7 +107,7 @@ VARIED = {
     "curl in locks": (curl.Settings(), (clump.Settings(size=0.04),), {"radius": (0.004, 0.01), "pitch": (0.02, 0.05)}),
     "frizz": (frizz.Settings(), (), {"amplitude": (0.002, 0.008), "wavelength": (0.02, 0.07)}),
     "clump": (clump.Settings(size=0.04), (), {"thickness": (0.1, 0.6), "twist": (0.0, 1.0), "stray": (0.0, 0.4)}),
-    "hands of curls": (curl.Settings(radius=0.01), (), {"left_handed": (0.0, 0.9), "stretch": (0.0, 1.0)}),
+    "hands of curls": (curl.Settings(radius=0.01), (), {"left_handed": (0.0, 0.9), "switchback": (0.0, 0.04)}),
     "coherent frizz": (frizz.Settings(amplitude=0.006), (), {"coherence": (0.0, 0.7), "stray": (0.0, 0.4)}),
 }
 
