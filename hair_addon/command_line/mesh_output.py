@@ -8,7 +8,7 @@ from . import export, opening, options
 
 blender = lazy.Package("..blender", __package__)
 
-_ENDINGS = ".blend, .glb, .fbx, .usdc, .obj"
+_ENDINGS = ".blend, .glb, .vrm, .fbx, .usdc, .obj"
 
 
 def add(parser):

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import HairError
-from ...core.files import gltf_springs
+from ...core.files import gltf_springs, vrm
 from ...core.files.atomic_file import atomic_file, require_writable_path
 from ..data.made import armature_weights, chain_armatures
 from ..host import paths
@@ -21,6 +21,15 @@ def _blend(path):
 def _gltf(path):
     bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", use_selection=True, export_tangents=True)
     gltf_springs.add(Path(path), chain_armatures.all_springs())
+
+
+def _vrm(path):
+    partial = Path(path).with_suffix(".glb")  # the exporter would append its own ending
+    try:
+        _gltf(str(partial))
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _fbx(path):
@@ -41,6 +50,7 @@ def _obj(path):
 _FORMATS = {
     ".blend": (_blend, "wm.save_as_mainfile", True),
     ".glb": (_gltf, "export_scene.gltf", True),
+    ".vrm": (_vrm, "export_scene.gltf", True),
     ".fbx": (_fbx, "export_scene.fbx", False),
     ".usdc": (_usd, "wm.usd_export", False),
     ".obj": (_obj, "wm.obj_export", False),
@@ -76,6 +86,36 @@ def write(path, objects):
     export = _FORMATS[path.suffix.lower()][0]
     rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
     above = [rig.parent for rig in rigs if rig.parent is not None and rig.parent.type == "ARMATURE"]
-    chosen = [*dict.fromkeys([*objects, *rigs, *above])]
+    chosen, humanoid = [*dict.fromkeys([*objects, *rigs, *above])], None
+    if export is _vrm:
+        chosen, humanoid, bones = _avatar(chosen)
     with contextlib.nullcontext() if export is _blend else only_chosen(chosen), atomic_file(path) as partial:
         export(str(partial.absolute()))  # exporters derive texture paths from this path
+        if humanoid is not None:
+            vrm.add(partial, humanoid.name, bones, path.stem)
+
+
+def _avatar(chosen):
+    """Return (objects of an avatar, its armature, bones of the humanoid); chosen: meshes of hair and armatures.
+
+    An avatar has all visible meshes of its armature, and hair of the finest level. Raises `HairError`.
+    """
+    rigs = [one for one in chosen if one.type == "ARMATURE"]
+    humanoid, bones = _humanoid(rigs)
+    shown = bpy.context.view_layer.objects
+    body = [one for one in shown if one.type == "MESH" and not one.hide_render and _follows(one, humanoid)]
+    hair = [one for one in chosen if one.type == "MESH" and not one.hide_render]
+    return [*dict.fromkeys([*hair, *body, *rigs])], humanoid, bones
+
+
+def _humanoid(rigs):
+    """Return (armature object, bones) of the first humanoid among armatures, or of an error of the largest one."""
+    largest = sorted(rigs, key=lambda one: -len(one.data.bones))
+    for rig in largest:
+        with contextlib.suppress(HairError):
+            return rig, vrm.humanoid_bones(bone.name for bone in rig.data.bones)
+    return None, vrm.humanoid_bones(bone.name for rig in largest[:1] for bone in rig.data.bones)
+
+
+def _follows(mesh_object, armature_object):
+    return any(modifier.object == armature_object for modifier in armature_weights.armatures_of(mesh_object))

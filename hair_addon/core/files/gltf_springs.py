@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Springs of bone chains in glTF files, as the extension VRMC_springBone 1.0 [VRM22]."""
 
-import json
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-_HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+from . import glb
+
 NAME = "VRMC_springBone"
 
 
@@ -37,24 +36,12 @@ def add(path: Path, springs: list[Springs]) -> None:
     Springs of armatures that the file lacks are left out. A file to which the exporter's hooks have already added
     springs is unchanged.
     """
-    described, chunks = _read(path)
+    described, chunks = glb.read(path)
     found = extension(described["nodes"], springs)
     if not found or NAME in described.get("extensions", {}):
         return
-    described["extensionsUsed"] = [*{**dict.fromkeys(described.get("extensionsUsed", [])), NAME: None}]
-    described.setdefault("extensions", {})[NAME] = found
-    text = json.dumps(described, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    body = _CHUNK.pack(len(text), b"JSON") + text + chunks
-    path.write_bytes(_HEADER.pack(b"glTF", 2, _HEADER.size + len(body)) + body)
-
-
-def _read(path):
-    """Return (the JSON of a file as a dictionary, its further chunks as bytes)."""
-    content = path.read_bytes()
-    length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
-    start = _HEADER.size + _CHUNK.size
-    return json.loads(content[start : start + length]), content[start + length :]
+    glb.add_extension(described, NAME, found)
+    glb.write(path, described, chunks)
 
 
 def extension(nodes: list[dict], springs: list[Springs]) -> dict:
@@ -68,10 +55,10 @@ def extension(nodes: list[dict], springs: list[Springs]) -> dict:
         armature = next((index for index, node in enumerate(nodes) if node.get("name") == its.armature), None)
         if armature is None:
             continue
-        below = {nodes[index]["name"]: index for index in _below(nodes, armature)}
-        if not {its.root, *(name for chain in its.chains for name in chain)} <= below.keys():
+        known = {nodes[index]["name"]: index for index in below(nodes, armature)}
+        if not {its.root, *(name for chain in its.chains for name in chain)} <= known.keys():
             continue
-        root = below[its.root]
+        root = known[its.root]
         first = len(written["colliders"])
         to_root = np.linalg.inv(to_scene[root])
         for center, radius in zip(its.centers, its.radii, strict=True):
@@ -84,7 +71,7 @@ def extension(nodes: list[dict], springs: list[Springs]) -> dict:
             numbers = list(range(first, len(written["colliders"])))
             written["colliderGroups"].append({"name": its.root, "colliders": numbers})
         for chain in its.chains:
-            joints = [{"node": below[name], **_joint(its)} for name in chain]
+            joints = [{"node": known[name], **_joint(its)} for name in chain]
             written["springs"].append({"name": chain[0], "joints": joints, "colliderGroups": groups})
     return {key: value for key, value in written.items() if value} if written["springs"] else {}
 
@@ -100,8 +87,8 @@ def _joint(springs):
     }
 
 
-def _below(nodes, root):
-    """Return the indices of all nodes below a node."""
+def below(nodes: list[dict], root: int) -> list[int]:
+    """Return the indices of all nodes below a node of a glTF file."""
     found = list(nodes[root].get("children") or [])
     for index in found:
         found += nodes[index].get("children") or []

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Humanoids in glTF files, as the extension VRMC_vrm 1.0 [VRMHumanoid22]."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ..errors import HairError
+from . import glb
+from .gltf_springs import below
+
+NAME = "VRMC_vrm"
+_LICENSE = "https://vrm.dev/licenses/1.0/"
+
+# Bones that a humanoid must have, and their names in rigs of Mixamo, Rigify and Unreal, without sides and separators.
+_REQUIRED = {
+    "hips": ("hips", "spine", "pelvis"),
+    "spine": ("spine", "spine001", "spine01"),
+    "head": ("head", "spine006"),
+}
+_REQUIRED_OF_SIDES = {
+    "UpperLeg": ("upperleg", "upleg", "thigh"),
+    "LowerLeg": ("lowerleg", "leg", "shin", "calf"),
+    "Foot": ("foot",),
+    "UpperArm": ("upperarm", "arm"),
+    "LowerArm": ("lowerarm", "forearm"),
+    "Hand": ("hand",),
+}
+_OTHERS = {"chest": ("chest", "spine1", "spine002", "spine02"), "neck": ("neck", "neck01", "spine004")}
+_OTHERS_OF_SIDES = {
+    "Shoulder": ("shoulder", "clavicle"),
+    "Toes": ("toes", "toe", "toebase", "ball"),
+    "Eye": ("eye",),
+}
+
+
+def humanoid_bones(names: Iterable[str]) -> dict[str, str]:
+    """Return {bone of VRM: name of a bone} of an armature whose bones have usual names, with all required bones.
+
+    Raises `HairError` naming the missing bones.
+    """
+    known = {}
+    for name in names:
+        known.setdefault(_plain(name), name)
+    # Rigify's hips are called spine, as the spine of others.
+    has_own_hips = any(("", kind) in known for kind in ("hips", "pelvis"))
+    found, missing = {}, []
+    for required, kinds in ((True, _REQUIRED), (False, _OTHERS)):
+        for bone, usual in kinds.items():
+            usual = tuple(one for one in usual if not (bone == "hips" and one == "spine" and has_own_hips))
+            _add(found, missing if required else [], bone, [("", one) for one in usual], known)
+    for required, kinds in ((True, _REQUIRED_OF_SIDES), (False, _OTHERS_OF_SIDES)):
+        for side in ("left", "right"):
+            for bone, usual in kinds.items():
+                _add(found, missing if required else [], side + bone, [(side, one) for one in usual], known)
+    if missing:
+        raise HairError(
+            "A VRM file needs an armature with the bones of a humanoid; missing: {names}.", names=", ".join(missing)
+        )
+    return found
+
+
+def _add(found, missing, bone, keys, known):
+    """Add the first known and unused key to the found bones, or the bone to the missing ones."""
+    used = set(found.values())
+    name = next((known[key] for key in keys if key in known and known[key] not in used), None)
+    if name is None:
+        missing.append(bone)
+    else:
+        found[bone] = name
+
+
+def _plain(name):
+    """Return (side: "left", "right" or "", name without side and separators in small letters) of a bone."""
+    text = name.rpartition(":")[2]
+    text = re.sub(r"^J_Bip_([CLR])_", lambda match: {"C": "", "L": "Left", "R": "Right"}[match[1]], text)
+    side = ""
+    for pattern, found in ((r"^left|[._ -]l$", "left"), (r"^right|[._ -]r$", "right")):
+        shorter = re.sub(pattern, "", text, flags=re.IGNORECASE)
+        if shorter != text:
+            side, text = found, shorter
+            break
+    return side, re.sub(r"[._ -]", "", text).lower()
+
+
+def add(path: Path, armature: str, bones: dict[str, str], title: str) -> None:
+    """Make a .glb file with an armature a VRM file; bones: of `humanoid_bones`; title: of the avatar.
+
+    The file grants no rights beyond those that VRM's license grants by default. Raises `HairError` if the file lacks
+    the armature or one of the bones.
+    """
+    described, chunks = glb.read(path)
+    nodes = described["nodes"]
+    root = next((index for index, node in enumerate(nodes) if node.get("name") == armature), None)
+    found = {} if root is None else {nodes[index]["name"]: index for index in below(nodes, root)}
+    lost = [name for name in bones.values() if name not in found]
+    if lost:
+        raise HairError("The exporter left out bones of the humanoid: {names}.", names=", ".join(lost))
+    glb.add_extension(described, NAME, extension({bone: found[name] for bone, name in bones.items()}, title))
+    glb.write(path, described, chunks)
+
+
+def extension(bones: dict[str, int], title: str) -> dict[str, Any]:
+    """Return the extension for {bone of VRM: index of its node}."""
+    return {
+        "specVersion": "1.0",
+        "meta": {"name": title, "authors": ["unknown"], "licenseUrl": _LICENSE},
+        "humanoid": {"humanBones": {bone: {"node": node} for bone, node in bones.items()}},
+    }
