@@ -43,6 +43,7 @@ _OPERATORS = {
     "guides": (
         *("distribute_guides", "draw_flow"),
         *("freeze_selected", "unfreeze_all", "invert_frozen"),
+        *("save_selection", "select_saved", "remove_selection"),
         *("add_layer", "remove_layer", "duplicate_layer", "move_layer", "merge_layer_down", "apply_layers"),
     ),
     "guide_tools": (

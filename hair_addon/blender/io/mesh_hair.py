@@ -17,6 +17,7 @@ from ...core.grooming.derived_guides import DerivationSettings
 from ...core.long_work import Work, part_of
 from ...core.maps import pixels
 from ...core.maps.map_settings import MapSettings
+from ...core.params import Param, plain_value
 from ..data import scene, usable_surfaces, whole_changes
 from ..data.made import made_meshes
 from ..data.pictures import hair_pieces
@@ -71,6 +72,7 @@ def using_mesh(
 
     hides_mesh: hide the mesh object in viewports and renders. Raises `HairError` before anything changes.
     """
+    hides_mesh = plain_value("Hide Mesh", hides_mesh, True, Param(""))
     _require_usable(mesh_object, surface_object)
     pieces = hair_pieces.read(mesh_object, depsgraph)
     mesh = TriMesh(_in_world(mesh_object, pieces.vertices), pieces.triangles)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import HairError
 from ..geometry.faces.connected_components import joined
-from ..geometry.mesh import TriMesh, require_finite
+from ..geometry.mesh import TriMesh
 
 MOST_TRIANGLES = 2_000_000  # of a hair mesh
 
@@ -58,7 +58,8 @@ def pieces_of(mesh: TriMesh) -> list[Piece]:
             count=len(mesh.triangles),
             most=MOST_TRIANGLES,
         )
-    require_finite(mesh.vertices)
+    if not np.isfinite(mesh.vertices).all():
+        raise HairError("The hair mesh has non-finite coordinates: repair the mesh or its modifiers.")
     corners = _welded(mesh.vertices)[mesh.checked_triangles].astype(np.int64)
     used = _distinct_faces(corners, len(mesh.vertices))
     if not len(used):

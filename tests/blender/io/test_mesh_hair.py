@@ -184,6 +184,8 @@ def test_what_is_no_hair_on_a_surface_is_one_sentence(sphere, cards):
         with pytest.raises(HairError, match=sentence) as refused:
             api.mesh_to_hair(chosen, surface, guide_count=GUIDES)
         assert str(refused.value).count(".") == 1 and not cards.hide_render
+    with pytest.raises(HairError, match="Hide Mesh must be True or False"):
+        api.mesh_to_hair(cards, sphere, hides_mesh="yes")
     select(cards)
     with pytest.raises(RuntimeError, match="Select the mesh that the hair grows on"):
         bpy.ops.vellus.mesh_to_hair()

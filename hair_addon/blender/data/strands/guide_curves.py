@@ -5,7 +5,7 @@ import numpy as np
 
 from . import attributes
 
-_SELECTION = ".selection"  # Blender's attribute of Sculpt Mode and Edit Mode; absent if all is selected
+SELECTION = ".selection"  # Blender's attribute of Sculpt Mode and Edit Mode; absent if all is selected
 _POINTS, _CURVES = "POINT", "CURVE"
 
 
@@ -16,9 +16,9 @@ def selection(curves, starts):
     starts (S+1,): index of each curve's first point.
     """
     for data_type in ("BOOLEAN", "FLOAT"):
-        values = attributes.read(curves, _SELECTION, data_type, _CURVES)
+        values = attributes.read(curves, SELECTION, data_type, _CURVES)
         if values is None and len(starts) > 1:
-            of_points = attributes.read(curves, _SELECTION, data_type, _POINTS)
+            of_points = attributes.read(curves, SELECTION, data_type, _POINTS)
             has_points = np.diff(starts) > 0
             if of_points is not None and has_points.any():
                 values = np.zeros(len(starts) - 1, np.float32)
@@ -35,7 +35,7 @@ def selected_points(curves, starts):
     """
     for data_type in ("BOOLEAN", "FLOAT"):
         for domain in (_POINTS, _CURVES):
-            values = attributes.read(curves, _SELECTION, data_type, domain)
+            values = attributes.read(curves, SELECTION, data_type, domain)
             if values is not None:
                 found = values.astype(np.float32) >= 0.5
                 found = np.repeat(found, np.diff(starts)) if domain == _CURVES else found

@@ -6,6 +6,7 @@ import bpy
 from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings
 from ...data.scene import triangle_count
+from ...data.strands import selection_sets
 from ...data.strands.curves import is_hand_made
 from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.guides import guide_states
@@ -156,10 +157,32 @@ class VELLUS_PT_guides_frozen(HairTab, bpy.types.Panel):
         column.operator("vellus.invert_frozen")
 
 
+class VELLUS_PT_guides_selections(HairTab, bpy.types.Panel):
+    """Saved selections of guides"""
+
+    bl_label = "Selections"
+    bl_idname = "VELLUS_PT_guides_selections"
+    bl_parent_id = "VELLUS_PT_guides"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+    def draw(self, context):
+        self.layout.operator("vellus.save_selection", icon="ADD")
+        column = self.layout.column(align=True)
+        for name in selection_sets.names(guides_of(context.object)):
+            row = column.row(align=True)
+            row.operator("vellus.select_saved", text=name, icon="RESTRICT_SELECT_OFF", translate=False).name = name
+            row.operator("vellus.remove_selection", text="", icon="X").name = name
+
+
 CLASSES = (
     VELLUS_PT_guides,
     VELLUS_PT_guides_growth,
     VELLUS_PT_guides_placement,
     VELLUS_PT_guides_tools,
     VELLUS_PT_guides_frozen,
+    VELLUS_PT_guides_selections,
 )

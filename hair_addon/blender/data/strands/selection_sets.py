@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Named selections of guides: boolean attributes of points, and Blender's own selection."""
+
+import numpy as np
+
+from . import attributes, curves, guide_curves
+
+_PREFIX = "selection_"
+
+
+def names(datablock):
+    """Return the sorted names of the selection sets of guides."""
+    return sorted(
+        one.name.removeprefix(_PREFIX)
+        for one in datablock.attributes
+        if one.name.startswith(_PREFIX) and (one.data_type, one.domain) == ("BOOLEAN", "POINT")
+    )
+
+
+def read(datablock, name):
+    """Return (N,) bool: the points of a set; None if there is no set of this name."""
+    return attributes.read(datablock, _PREFIX + name, "BOOLEAN", "POINT")
+
+
+def write(datablock, name, are_chosen):
+    """Store the points (N,) of a set, which replace those of a set of this name."""
+    attributes.write(datablock, _PREFIX + name, "BOOLEAN", "POINT", are_chosen)
+
+
+def remove(datablock, name):
+    """Remove a set."""
+    datablock.attributes.remove(datablock.attributes[_PREFIX + name])
+
+
+def selected(datablock):
+    """Return (N,) bool: the points that are selected in Sculpt Mode or Edit Mode; None if all or none are."""
+    return guide_curves.selected_points(datablock, curves.curve_offsets(datablock))
+
+
+def select(datablock, are_chosen):
+    """Select points (N,) of guides; whole guides if Blender selects whole curves."""
+    domain, values = "POINT", are_chosen
+    if datablock.selection_domain == "CURVE":
+        domain, values = "CURVE", np.logical_or.reduceat(are_chosen, curves.curve_offsets(datablock)[:-1])
+    attributes.write(datablock, guide_curves.SELECTION, "BOOLEAN", domain, values)
+    datablock.update_tag()

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Named selections of guides, which are saved and selected again."""
+
+import numpy as np
+from bpy.types import Curves
+
+from ....core.errors import HairError
+from ...data.strands import curves, selection_sets
+from ...host.notices import name_of
+
+_MOST_LETTERS = 40  # of a name, as names of attributes are limited
+
+
+def save(guides: Curves, name: str) -> int:
+    """Save the selected points of guides as a set; returns their number. Raises `HairError`."""
+    _require_editable(guides)
+    name = name.strip()
+    if not name or len(name.encode()) > _MOST_LETTERS:
+        raise HairError("Give the selection a name of at most {most} letters.", most=_MOST_LETTERS)
+    selected = selection_sets.selected(guides)
+    if selected is None:
+        raise HairError("Select guides, or points of guides, in Sculpt Mode or Edit Mode first.")
+    selection_sets.write(guides, name, selected)
+    return int(selected.sum())
+
+
+def select(guides: Curves, name: str, mode: str = "SET") -> int:
+    """Select the points of a set; returns the number of selected points. Raises `HairError`.
+
+    mode: "SET" replaces the selection, "ADD" extends it, "REMOVE" deselects the points of the set.
+    """
+    _require_editable(guides)
+    chosen = _points_of(guides, name)
+    present = selection_sets.selected(guides)
+    if present is None or mode == "SET":
+        present = np.full(len(chosen), mode == "REMOVE")
+    selected = present & ~chosen if mode == "REMOVE" else present | chosen
+    if not selected.any():
+        raise HairError("No point of the guides would be selected.")
+    selection_sets.select(guides, selected)
+    return int(selected.sum())
+
+
+def remove(guides: Curves, name: str) -> None:
+    """Remove a set. Raises `HairError`."""
+    _require_editable(guides)
+    _points_of(guides, name)
+    selection_sets.remove(guides, name)
+
+
+def _points_of(guides, name):
+    found = selection_sets.read(guides, name)
+    if found is None:
+        raise HairError('"{guides}" has no selection "{name}".', guides=name_of(guides), name=name)
+    return found
+
+
+def _require_editable(guides):
+    curves.require_editable(guides)
+    if not len(guides.points):
+        raise HairError('"{name}" has no guides: generate guides first.', name=name_of(guides))
