@@ -49,7 +49,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     const lanes geometric = carried * (exact_sqrt_of(dot(tension, tension)) + 0.5f * (moment + next_moment));
     moment = next_moment;
     // A lighter frame would be so stiff that single precision could not resolve its motion relative to its neighbors.
-    const lanes least_inertia = LEAST_INERTIA * h * h * (1.0f + damping) / compliance;
+    const lanes least_inertia = damped_inertia / compliance;
     const lanes turning = pins > lanes(static_cast<float>(j))
                               ? lanes(0.0f)
                               : lanes(1.0f / (higher_of(get(inertia, j), least_inertia) + geometric));
@@ -66,7 +66,6 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     vector kept_b = get_vector(lambda, 2 * j), kept_s = tension;
     if (is_first) kept_b = kept_s = vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
     // Kelvin-Voigt damping, γ = τ / h: -(C + α̃ λ + γ (C - C_n)) / (1 + γ).
-    const lanes damped = 2.0f * (1.0f + damping), undamped = -2.0f * damping;
     lanes R[6] = {-(damped * e.x + undamped * e_before.x + per_step * kept_b.x) * inverse_damping,
                   -(damped * e.y + undamped * e_before.y + per_step * kept_b.y) * inverse_damping,
                   -(damped * e.z + undamped * e_before.z + per_twist * kept_b.z) * inverse_damping,

@@ -175,6 +175,8 @@ const auto away_of = [&](int i) {
 };
 const float inverse_square = 1.0f / (h * h);
 const lanes damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
+const lanes damped = 2.0f * (1.0f + damping), undamped = -2.0f * damping;
+const lanes damped_inertia = LEAST_INERTIA * h * h * (1.0f + damping);
 for (int substep = first; substep < end; ++substep) {
   // The root between the frame's two poses: positions linear, rotations by nlerp.
   const float part = static_cast<float>(substep + 1) / static_cast<float>(count);
