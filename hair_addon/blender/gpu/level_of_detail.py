@@ -14,9 +14,10 @@ import numpy as np
 from . import drawing
 
 # Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands would
-# widen the tips of locks and the outline. Distance [samples] between two points.
+# widen the tips of locks and the outline. Distance [samples] between two points; and the greatest distance [samples] of
+# a bend from the line between them, for which strands may have fewer.
 _FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
-_PIECE_LENGTH = 2.0
+_PIECE_LENGTH, _GREATEST_BEND = 2.0, 0.5
 
 _LEAST_STRANDS, _LEAST_POINTS = 2000, 9
 
@@ -55,11 +56,32 @@ def _steps(strands, to_world, limits, samples_per_unit, diameter, turn):
     samples_per_meter = samples_per_unit * drawing.scale_of(to_world)
     wanted = 2.0 * strands.mean_radius * samples_per_meter / min(_FULL_WIDTH, _WIDTH_PART * diameter)
     strand_count = int(min(max(count * min(wanted, part), min(_LEAST_STRANDS, count * part)), count))
-    pieces = strands.mean_length * samples_per_meter / _PIECE_LENGTH
-    point_count = min(max(math.ceil(min(pieces, strands.point_count)) + 1, _LEAST_POINTS), strands.point_count)
+    length = strands.mean_length * samples_per_meter
+    pieces = math.ceil(min(length / _PIECE_LENGTH, strands.point_count))
+    point_count = min(max(pieces + 1, _LEAST_POINTS), strands.point_count)
+    if strand_count < count:
+        point_count = min(point_count, _points_that_show(strands, length))
     # With a limit by the artist each pass draws the same strands.
     first = int(turn * count) if part == 1.0 else 0
     return drawing.Steps(point_count, max(strand_count, 1), first)
+
+
+def _points_that_show(strands, length):
+    """Return the fewest evenly chosen points that show the bends of `StrandsOnGPU`; length: of strands [samples].
+
+    All points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is longer
+    than the chord by the fraction 8/3 (s / c)².
+    """
+    pieces, enough = strands.point_count - 1, strands.point_count
+    for step in range(2, pieces // (_LEAST_POINTS - 1) + 1 if strands.has_points else 0):
+        if pieces % step:
+            continue
+        drawn = pieces // step
+        bend = length / drawn * math.sqrt(0.375 * max(strands.lengthening(drawn + 1) - 1.0, 0.0))
+        if not bend <= _GREATEST_BEND:
+            break
+        enough = drawn + 1
+    return enough
 
 
 def _sizes_in(view, placed):

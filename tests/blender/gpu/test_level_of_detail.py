@@ -40,7 +40,7 @@ def many(rng):
     roots = rng.normal(size=(50_000, 1, 3))
     roots /= np.linalg.norm(roots, axis=2, keepdims=True)
     points = (roots * np.linspace(1.0, 1.4, 41)[:, None]).astype(np.float32)
-    return strand_textures.upload_strands(points, np.full(points.shape[:2], 1e-4, np.float32))
+    return strand_textures.upload_strands(points, np.full(points.shape[:2], 2e-4, np.float32))
 
 
 def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
@@ -67,6 +67,19 @@ def test_all_strands_and_points_are_drawn_if_the_artist_asks_for_them(many):
     whole, half = (steps_from(many, 300.0, part, is_reduced=False) for part in (1.0, 0.5))
     assert drawing.strand_record(many, uniforms.VIEW.record(), np.eye(4), whole)["drawn_points"] == 41
     assert (whole.strand_count, half.strand_count) == (50_000, 25_000)
+
+
+def test_distant_strands_have_as_many_points_as_their_bends_need(rng):
+    """Of strands as far away, straight ones have fewer points than bent ones, and those fewer than curls."""
+    along = np.linspace(0.0, 1.0, 41)[:, None]
+    roots, points = np.append(rng.uniform(-0.5, 0.5, (20_000, 1, 2)), np.zeros((20_000, 1, 1)), axis=2), []
+    for turns, width in ((0.0, 0.0), (1.0, 0.05), (8.0, 0.05)):
+        bends = width * np.sin(2.0 * np.pi * turns * along) * [1.0, 0.0, 0.0]
+        strands = (roots + bends + along * [0.0, 0.0, 0.5]).astype(np.float32)
+        uploaded = strand_textures.upload_strands(strands, np.full(strands.shape[:2], 1e-4, np.float32))
+        points.append(steps_from(uploaded, 1.2).point_count)
+        assert steps_from(uploaded, 0.1).point_count == 41
+    assert points[0] == 9 < points[1] < points[2] <= 41
 
 
 def test_near_hair_is_not_reduced(many):
