@@ -10,6 +10,7 @@ from hair_addon.core.cards import best_placement, card_views
 from hair_addon.core.cards.card_error import Comparison, card_error
 from hair_addon.core.cards.card_layout import CardStrands, Placement
 from hair_addon.core.cards.card_settings import CardSettings, Level
+from hair_addon.core.geometry.mesh import TriMesh
 from tests.core.cards.conftest import sphere, wavy_hair
 
 SAMPLES = 128  # fewer than the default take less time
@@ -67,6 +68,17 @@ def test_thinner_strands_cover_less_and_differ(strands):
 def test_more_cards_have_less_error(comparison, strands):
     errors = [error(comparison, strands, count, 512).mean for count in (4, 40, 160)]
     assert errors[0] > errors[1] > errors[2] > 0.0
+
+
+@pytest.mark.parametrize(("scale", "place"), [(0.01, 0.0), (100.0, 0.0), (1.0, 30.0)])
+def test_the_error_does_not_depend_on_unit_and_place(comparison, strands, scale, place):
+    """Cards of scaled or moved strands have the error of the same cards at rest, within rounding."""
+    surface = TriMesh(np.float32(scale * strands.surface.vertices + place), strands.surface.triangles)
+    points = np.float32(scale * strands.points + place)
+    moved = replace(strands, points=points, radii=np.float32(scale * strands.radii), surface=surface)
+    found, wanted = error(Comparison(moved, samples=SAMPLES), moved, 40), error(comparison, strands, 40)
+    assert found.coverage == pytest.approx(wanted.coverage, rel=0.03)
+    assert found.flip == pytest.approx(wanted.flip, rel=0.03)
 
 
 def test_crossed_cards_have_less_error_than_as_many_single_cards(comparison, strands):
