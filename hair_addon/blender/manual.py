@@ -50,7 +50,7 @@ _OPERATORS = {
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
         *("smooth_guides", "lift_guides", "attract_guides", "drape_guides", "push_outside", "gather_guides"),
     ),
-    "strands": ("interpolate_hair", "draw_parting", "update_hair"),
+    "strands": ("interpolate_hair", "draw_parting", "paint_density", "update_hair"),
     "dynamics": (
         *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset", "stiffen_dynamics"),
         *("deliver_dynamics", "remove_delivery"),

@@ -180,6 +180,7 @@ MAKING = {
     "add_style": [(on_styled, {"style": "FRIZZ"})],
     "duplicate_style": [(on_styled, {})],
     "paint_style_mask": [(on_styled, {})],
+    "paint_density": [(on_hair, {})],
     "paint_map": [(on_map("GROUP"), {"setting": "look.color"}), (on_map("IMAGE"), {"setting": "look.color"})],
     "add_ramp": [(on_hair, {})],
     "add_map_ramp": [(on_map("GROUP"), {"setting": "look.color"})],

@@ -10,7 +10,7 @@ from ....core.styling.kinds import DESCRIPTIONS, OFFERS
 from ....core.styling.program import tree_settings
 from ...data.strands.curves import require_editable
 from ...groom.selection import hair_of
-from ...groom.styles import hair_styles, painted_masks
+from ...groom.styles import hair_styles, painted_density, painted_masks
 from ...groom.transfer import groom_settings
 from ...settings import properties, saved_styles, style_items
 from .base.hair_operator import HairOperator, needs_hair
@@ -173,6 +173,27 @@ class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
             painted_masks.paint(hair_of(context.object), active_style_of(context), context)
 
 
+class VELLUS_OT_paint_density(HairOperator, bpy.types.Operator):
+    """Paint the density of strands on the surface with Blender's brushes; or stop painting"""
+
+    bl_idname = "vellus.paint_density"
+    bl_label = "Paint Density"
+
+    @classmethod
+    def applies(cls, context):
+        if painted_masks.is_painting(context.object):
+            return True
+        cls.poll_message_set("Select hair on a surface, in Object Mode.")
+        hair = hair_of(context.object)
+        return context.mode == "OBJECT" and hair is not None and hair.surface is not None
+
+    def change(self, context):
+        if painted_masks.is_painting(context.object):
+            painted_masks.stop(context.object, context)
+        else:
+            painted_density.paint(hair_of(context.object), context)
+
+
 class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
     """Limit the active style to the selected guides, as painted in Sculpt Mode"""
 
@@ -273,6 +294,7 @@ CLASSES = (
     VELLUS_OT_duplicate_style,
     VELLUS_OT_use_points,
     VELLUS_OT_paint_style_mask,
+    VELLUS_OT_paint_density,
     VELLUS_OT_mask_from_selection,
     VELLUS_OT_apply_style_preset,
     VELLUS_OT_apply_saved_style,

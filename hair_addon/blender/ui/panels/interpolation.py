@@ -8,6 +8,7 @@ from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom import hair_memory
 from ...groom.selection import active_of_kind, guides_of, hair_of
+from ...groom.styles import painted_masks
 from ...groom.systems.diagnostics import parting_warnings, sharing_note
 from ...host import memory
 from ...render import hair_cache
@@ -46,6 +47,9 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             write(layout, context, shared, "INFO")
             layout.operator("vellus.make_own_guides")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
+        painting = painted_masks.is_painting(context.object)
+        text, icon = ("Stop Painting", "CHECKMARK") if painting else ("Paint Density", "BRUSH_DATA")
+        layout.operator("vellus.paint_density", text=text, icon=icon)
         map_rows.ramp_rows(layout, hair)
         setting_rows.row(layout, state, "is_live")
         write_stale(layout, context, state)
