@@ -116,9 +116,9 @@ def test_images_extend_as_their_nodes_say():
     }
     for extension, row in rows.items():
         for is_closest in (True, False):
-            found = root_colors._look_up(pixels, uvs, extension, is_closest)
+            found = root_colors.look_up(pixels, uvs, extension, is_closest)
             np.testing.assert_allclose(found[:, 0], row, atol=1e-6, err_msg=extension)
-    between = root_colors._look_up(pixels, np.array([[0.25, 0.5]]), "EXTEND", False)
+    between = root_colors.look_up(pixels, np.array([[0.25, 0.5]]), "EXTEND", False)
     assert between[0, 0] == pytest.approx(1.5)
 
 
