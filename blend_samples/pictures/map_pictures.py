@@ -247,7 +247,7 @@ def stripes():
 
 
 def patches():
-    """Masks (TEXELS, TEXELS) of a calico cat from the front, the bottom row first: 0 white, 0.5 orange, 1 black."""
+    """Return masks (TEXELS, TEXELS) of a calico cat from the front, bottom row first: 0 white, 0.5 orange, 1 black."""
     v, u = np.mgrid[-1.0 : 1.0 : TEXELS * 1j, -1.0 : 1.0 : TEXELS * 1j]
     ragged = 0.05 * np.sin(9.0 * u + 3.0 * np.sin(7.0 * v)) + 0.035 * np.sin(17.0 * v + 4.0 * u)
 

@@ -19,9 +19,9 @@ from hair_addon import api
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "mesh_to_hair.png"
 CARDS, STRANDS = 260, 12_000
-CUT = 16  # pixels off either side of a picture
+CUT = 16  # pixels that are cut off either side of a picture
 WIDTH = SIZE[0] - 2 * CUT
-SAMPLE_COUNT = 16  # of a pixel
+SAMPLE_COUNT = 16  # per pixel
 
 
 def main():

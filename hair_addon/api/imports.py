@@ -152,8 +152,9 @@ def mesh_to_hair(
 
     settings: `MeshStrandSettings`; changes: its fields by name; guide_count: as of `use_as_hair`; hides_mesh: hide the
     mesh object. Strands run from the root end to the tip end of each piece; the colors of the mesh's material or color
-    attribute become a map of their color. The result has `hair` and `guides`, the Curves, `piece_count`, the number of
-    used pieces, and `skipped_count`, of pieces that are neither cards nor slender.
+    attribute become a map of the hair's color. The result has `hair` and `guides`, the Curves, `piece_count`, the
+    number of used pieces, and `skipped_count`, the number of pieces that are neither cards nor slender, or too large.
+    Raises `HairError` before anything changes.
 
     >>> tubes = api.make_hair_tubes(bpy.data.objects["Hair"], tube_count=100)
     >>> made = api.mesh_to_hair(tubes, bpy.data.objects["Scalp"], strand_count=100, guide_count=20)
@@ -211,7 +212,9 @@ def import_groups(
     unit: str | float | None = None,
     up: str | None = None,
 ) -> "list[Found]":
-    """Read each group of a groom from a file, for a hair system of its own; arguments: as of `import_curves`.
+    """Read the groups of a groom from a file, each for its own hair system, and return a result for each group.
+
+    Arguments and results are those of `import_curves`. Raises `HairError`.
 
     >>> api.export_groom("groom.abc", [bpy.data.objects["Hair"]])
     []

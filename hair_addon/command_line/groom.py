@@ -235,7 +235,7 @@ def _warn_of_useless(names, reason, console):
 
 @contextlib.contextmanager
 def _curves_of(kind, given, surface, file_axes, console):
-    """Context with [`Found`] of a curve file, which may be the open one, one for each hair system; prints its notes."""
+    """Context with [`Found`], one for each hair system, of a curve file, or of the open file; prints its notes."""
     path = given.guides_from or given.hair_from
     wanted = curve_options.wanted(kind, given, file_axes)
     is_open = path.resolve() == given.input.resolve()

@@ -14,9 +14,10 @@ import numpy as np
 from . import drawing
 
 # Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands would
-# widen the tips of locks and the outline. Distance [samples] between two points; and the greatest distance [samples] of
-# a bend from the line between them, for which strands may have fewer.
+# widen the tips of locks and the outline.
 _FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
+# Distance between two points [samples], and the greatest distance [samples] of a bend from the line between two points
+# at which a strand may have fewer points.
 _PIECE_LENGTH, _GREATEST_BEND = 2.0, 0.5
 
 _LEAST_STRANDS, _LEAST_POINTS = 2000, 9

@@ -70,7 +70,7 @@ def drawn_in(window):
 
 
 def _around(clip, are_in_front, size, margin):
-    """Return the windows around (N, 4, 8) corners in clip space; that of the picture for boxes behind the viewer."""
+    """Return the windows around (N, 4, 8) corners in clip space; the whole picture for boxes behind the viewer."""
     w = np.where(are_in_front[:, None, None], clip[:, 3:], 1.0)
     places = (0.5 * clip[:, :2] / w + 0.5) * np.array(size)[:, None]
     margin = np.broadcast_to(margin, len(clip))[:, None]
@@ -101,7 +101,7 @@ def _corners_in_clip(bounds, to_clip):
 
 
 def _are_in_front(clip):
-    """Return (N,) whether no part of a box is behind the viewer."""
+    """Return (N,) bool: whether a box is wholly in front of the viewer."""
     return ((clip[:, 2] + clip[:, 3]).min(axis=1) > 0.0) & (clip[:, 3].min(axis=1) > 0.0)
 
 

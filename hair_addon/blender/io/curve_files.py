@@ -195,7 +195,7 @@ def parts_of(path, file, wanted, surface_object):
 
 
 def _group(one):
-    """Return what distinguishes the group of a `CurveSet`."""
+    """Return the ID and the name of the group of a `CurveSet`."""
     return one.group_id, one.group_name
 
 

@@ -24,7 +24,7 @@ def new_object(name, placed, surface_object, guide_ids=None, groups=None):
     bpy.context.scene.collection.objects.link(made)
     made.matrix_world = _without_shear(surface_object.matrix_world)
     bpy.context.view_layer.update()
-    # Blender rounds the transform, by up to 3e-5 of it.
+    # Blender rounds the transform, with relative errors of up to 3e-5.
     to_world = np.array(made.matrix_world, np.float64) * strand_arrays.meters_per_unit(bpy.context.scene)
     to_world[3, 3] = 1.0
     back, scale = np.linalg.inv(to_world), abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)

@@ -26,7 +26,7 @@ from . import hair_meshes
 class CardLevel:
     """A finished level of detail: its object, {map: image}, and numbers of cards, pictures and triangles.
 
-    error: beside the strands, or None if it was not measured; notes: on omitted parts of the hair.
+    error: of the cards compared with the strands, None if it was not measured; notes: on omitted parts of the hair.
     """
 
     mesh_object: object
@@ -77,7 +77,10 @@ def making_cards(hair, settings, folder=None):
 
 
 def _drawing(strands, comparison, level, settings, parts):
-    """Draw a level, as work in steps; comparison: or None; parts: (first, last) of the total progress."""
+    """Draw a level, as work in steps.
+
+    comparison: with the strands, None for no error; parts: (first, last) of the total progress.
+    """
     first, last = parts
     middle = first + 0.1 * (last - first)
     choice = settings, Placement()

@@ -109,7 +109,10 @@ def _avatar(chosen):
 
 
 def _humanoid(rigs):
-    """Return (armature object, bones) of the first humanoid among armatures, or of an error of the largest one."""
+    """Return (armature object, bones) of the largest humanoid among armatures.
+
+    Raises `HairError` that names the bones that the largest armature lacks.
+    """
     largest = sorted(rigs, key=lambda one: -len(one.data.bones))
     for rig in largest:
         with contextlib.suppress(HairError):

@@ -35,7 +35,7 @@ COLOR = "mesh_color"  # attribute of strands
 
 @dataclass(frozen=True)
 class MeshHair:
-    """The `KeptHair` of a mesh, its numbers of cards, tubes and locks, and the number of other pieces."""
+    """The `KeptHair` of a mesh, the number of its cards, tubes and locks, and the number of skipped pieces."""
 
     kept: KeptHair
     piece_count: int

@@ -64,8 +64,9 @@ def maps_changed(guides):
 
 
 def map_status_of(guides):
-    """Return a sentence about a missing source of the maps of guides, whose settings have their values. Raises
-    `HairError` for an invalid surface.
+    """Return a sentence about a missing source of the maps of guides; its setting keeps its value.
+
+    Raises `HairError` for an invalid surface.
     """
     return map_status_cache.get(
         guides.session_uid, lambda: varied_dynamics.present(guides, scene.last_depsgraph()).status

@@ -126,7 +126,7 @@ def _pieces(points, surface, level, settings, placement, progress):
 
 
 def _ribbons(lines, strands, labels, level, surface, reach):
-    """Return (strands, labels, axes, reach) of cards for parts of strands; lines: of all strands."""
+    """Return (strands, labels, axes, reach) of cards for parts of strands; lines: points of all strands."""
     count = int(labels.max()) + 1
     return strands, labels, ribbons.axes_of(lines[strands], labels, count, level.segment_count, surface), reach
 
@@ -136,7 +136,7 @@ def _outermost(points, features, clump_count, count):
     labels = clusters.clusters(features, clump_count)
     middles, sizes = clusters.cluster_means(points, labels, clump_count), np.bincount(labels)
     away = np.linalg.norm(points - middles[labels], axis=-1).mean(axis=1)
-    away *= sizes[labels] / np.maximum(sizes[labels] - 1, 1)  # the middle without the strand itself
+    away *= sizes[labels] / np.maximum(sizes[labels] - 1, 1)  # distance from the middle of the other strands
     for strand in np.flatnonzero(sizes[labels] == 1) if clump_count > 1 else ():
         others = np.delete(middles, labels[strand], axis=0)
         away[strand] = np.linalg.norm(points[strand] - others, axis=-1).mean(axis=1).min()

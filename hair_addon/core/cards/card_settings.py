@@ -119,7 +119,7 @@ class CardSettings(Settings):
         return found
 
     def parts_of(self, card_count: int) -> tuple[int, int, int]:
-        """Return how many of a number of cards are crossed cards, flyaways and caps; at least one other is left."""
+        """Return the numbers of crossed cards, flyaways and caps among cards; at least one other card is left."""
         flyaways = min(int(self.flyaways * card_count), card_count - 1)
         caps = min(int(self.caps * card_count), card_count - 1 - flyaways)
         crossed = int((card_count - flyaways - caps) * self.crossed / (1.0 + self.crossed))

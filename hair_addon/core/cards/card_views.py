@@ -44,7 +44,7 @@ class View:
 
 
 class Sides:
-    """The six sides from which hair is seen, with a surface that hides what is behind it.
+    """The six sides from which hair is seen, with a surface that hides hair behind it.
 
     points: (S, P, 3) of the hair, finite; surface: `TriMesh` in the same space; samples: along each side of a view.
     """
@@ -108,7 +108,7 @@ class Sides:
 def strand_triangles(points: np.ndarray, radii: np.ndarray, toward: np.ndarray) -> np.ndarray:
     """Return triangles (2 · S · (P - 1), 3, 3), two for each segment of strands (S, P, 3), as wide as the strands.
 
-    radii: (S, P); toward: (3,) unit vector to the viewer, whom the triangles face.
+    radii: (S, P); toward: (3,) unit vector to the viewer, which the triangles face.
     """
     edges = np.diff(points, axis=1)
     across = np.cross(toward, edges)

@@ -50,7 +50,7 @@ def sections_of(
 ) -> Sections | None:
     """Return the `Sections` of a tube or a lock from root to tip; None if it is not slender.
 
-    points: (v, 3) [m]; root_first: as in `ribbon_charts.chart_of`.
+    points: (v, 3) [m]; root_first: as in `ribbon_charts.Charts.chart`.
     """
     return _slender(_rings(topology, points), root_first) or _slender(_of_levels(topology, points), root_first)
 
@@ -151,7 +151,7 @@ def _layers(topology, start):
 
 
 def _of_levels(topology, points):
-    """Return [(points, vertices)] of contours of the share of the distance from one end along the mesh."""
+    """Return [(points, vertices)] of contours of the distance from one end along the mesh, relative to both ends."""
     mesh = TriMesh(points.astype(np.float32), topology.triangles.astype(np.int32))
     first, second = _ends(mesh, points)
     if first == second:

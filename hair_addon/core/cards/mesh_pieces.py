@@ -81,7 +81,7 @@ def _welded(vertices):
 
 
 def _distinct_faces(corners, vertex_count):
-    """Return indices of the faces with three corners, of equal faces the first."""
+    """Return indices of the faces with three different corners; of equal faces, the first."""
     ordered = np.sort(corners, axis=1)
     is_face = (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2])
     faces = np.flatnonzero(is_face)

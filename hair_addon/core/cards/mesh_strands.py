@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes of hair cards, tubes and solid locks → strands.
 
-Strands of a card run from its root end to its tip end, at even places across it. Strands of a tube or a lock are evenly
-distributed over its cross sections, on the spiral of [Vogel79].
+Strands of a card run from its root end to its tip end, spread over its width with random offsets. Strands of a tube or
+a lock are evenly distributed over its cross sections, on the spiral of [Vogel79].
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
 _OPAQUE = 0.5  # alpha above which a texture shows hair
 _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
-_TOUCHING = 1e-5  # the same, of a root on the surface
+_TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
 _MOST_FACES = 20_000  # of a piece: larger ones are bodies
 
@@ -35,8 +35,7 @@ class MeshStrands:
 
     points: (N, 3) float32 [m]; counts: (S,) of points; radii: (N,) float32 [m] with which strands fill their piece;
     places: N `SurfacePoints` on the hair mesh, for its textures; pieces: (S,) piece of each strand; piece_count: number
-    of used pieces; skipped_count: number of pieces that are neither cards nor slender, or
-    too large.
+    of used pieces; skipped_count: number of pieces that are neither cards nor slender, or too large.
     """
 
     points: np.ndarray
@@ -249,7 +248,7 @@ def _distances(surface, points):
 
 
 def shown(strands: MeshStrands, alpha: np.ndarray) -> MeshStrands:
-    """Return strands that end where a texture becomes transparent, without those that it hides.
+    """Return strands that end where a texture becomes transparent, without mostly transparent strands.
 
     alpha: (N,) in [0, 1] at the points. Raises `HairError` if no strand is left.
     """
@@ -288,7 +287,7 @@ def on_surface(strands: MeshStrands, surface: TriMesh) -> MeshStrands:
     is_outside = first < len(points)
     is_extended = is_outside & (apart > _TOUCHING * lengths)
     is_extended &= (np.linalg.norm(roots - leaving, axis=1) <= _REACH * lengths) & (lengths > 0.0)
-    # A cut strand gives the place of its last point inside to the root; others get a new first point.
+    # The last point of a cut strand inside the surface becomes its root; other strands get a new first point.
     is_new = is_extended & ~is_cut
     keeps = place >= np.repeat(np.where(is_cut & is_extended, first - 1, 0), strands.counts)
     moved = strands.points.copy()

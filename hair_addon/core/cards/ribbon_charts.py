@@ -51,7 +51,8 @@ class Charts:
         """Return (`Layout`, (K,) widths [m] at its stations) of a card with one boundary loop.
 
         points: (v, 3) [m]; uvs: (v, 2) or None; away: (v,) [m] distances to the surface; root_first: a function of the
-        vertices of two ends and the length between them [m], whether the root is at the first, None if unclear.
+        vertices of two ends and the length between them [m] that returns whether the root is at the first end, None if
+        unclear.
         """
         loop = topology.loops[0]
         edges = points[loop[_following(len(loop))]] - points[loop]
@@ -114,7 +115,7 @@ def _at(points, along, stations):
 
 
 def _rows(points, lines):
-    """Return places from first to last of the vertices of two lines: equal numbers of vertices belong together."""
+    """Return places from 0 to 1 of the vertices of two lines; equal places if the lines have as many vertices."""
     if len(lines[0]) == len(lines[1]):
         return [np.linspace(0.0, 1.0, len(line)) for line in lines]
     return [_fractions(points[line]) for line in lines]
@@ -135,7 +136,7 @@ def _stations(rows):
 
 
 def divided(values: np.ndarray) -> np.ndarray:
-    """Return rows (K, ...) with as many rows between each two as it takes to have at least 8."""
+    """Return rows (K, ...), at least 8, with equally many interpolated rows between each two values."""
     parts = -(-(LEAST_STATIONS - 1) // (len(values) - 1))
     if parts <= 1:
         return values

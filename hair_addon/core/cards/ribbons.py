@@ -44,7 +44,7 @@ class Axes:
 
 
 def joined(parts: list[Axes]) -> Axes:
-    """Return the axes of all ribbons of several, with the same number of points."""
+    """Return the axes of all ribbons of several `Axes` with the same number of points."""
     return Axes(
         *(np.concatenate([getattr(part, name) for part in parts]) for name in ("centres", "tangents", "normals"))
     )
@@ -56,7 +56,7 @@ def axes_of(
     """Return the middle lines of `count` clumps of strands (S, P, 3); labels: (S,) clump of each strand.
 
     A line is the mean of the strands of a clump, resampled by curvature. Normals point in the direction of least
-    spread, away from the surface; outward: weight of the latter relative to the former.
+    spread, away from the surface; outward: weight of the direction away from the surface, relative to least spread.
     """
     means = clusters.cluster_means(points, labels, count)
     centres = curve_frames.resample_by_curvature(means, segment_count + 1)

@@ -8,7 +8,7 @@ from .texels import srgb
 PREFIX = "unreal_"  # of the names of packed textures, beside those of `texels.MAPS`
 
 # {layout: {texture: values of its channels}}, with Unreal's names of textures. Unreal reads the UV coordinates of roots
-# from vertices, so that the first channel of Attributes is empty; it also lists a texture Auxiliary, without content.
+# from vertices, so the first channel of Attributes is 0. Unreal also lists a texture Auxiliary, without content.
 _CHANNELS = {
     "SEPARATE": {},
     "UNREAL": {

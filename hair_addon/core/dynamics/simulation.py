@@ -122,7 +122,7 @@ class Simulation:
         self._since_rubbed = 0.0  # [s]
 
     def _hold(self):
-        """Hold guides up to their ties, if the settings do, and let each respond by its own settings."""
+        """Hold guides up to their ties if the settings ask for it, and give each guide its own damping and hold."""
         held = self._held if self.settings.holds_ties else np.zeros_like(self._held)
         self._rods.hold(held, self._pinned_counts())
         self._rods.respond(self._varied.get("damping"), self._varied.get("hold"))

@@ -10,7 +10,7 @@ _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
 
 
 def read(path: Path) -> tuple[dict[str, Any], bytes]:
-    """Return (the JSON of a file as a dictionary, its further chunks as bytes)."""
+    """Return (the JSON of a file as a dictionary, its other chunks as bytes)."""
     content = path.read_bytes()
     length, _kind = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
@@ -18,7 +18,7 @@ def read(path: Path) -> tuple[dict[str, Any], bytes]:
 
 
 def write(path: Path, described: dict[str, Any], chunks: bytes) -> None:
-    """Write a file of JSON and further chunks."""
+    """Write a file of JSON and other chunks."""
     text = json.dumps(described, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     body = _CHUNK.pack(len(text), b"JSON") + text + chunks

@@ -38,12 +38,12 @@ _OTHERS_OF_SIDES = {
 def humanoid_bones(names: Iterable[str]) -> dict[str, str]:
     """Return {bone of VRM: name of a bone} of an armature whose bones have usual names, with all required bones.
 
-    Raises `HairError` naming the missing bones.
+    Raises `HairError` that names the missing bones.
     """
     known = {}
     for name in names:
         known.setdefault(_plain(name), name)
-    # Rigify's hips are called spine, as the spine of others.
+    # Rigify calls the hips spine, which is the name of the spine in other rigs.
     has_own_hips = any(("", kind) in known for kind in ("hips", "pelvis"))
     found, missing = {}, []
     for required, kinds in ((True, _REQUIRED), (False, _OTHERS)):

@@ -63,7 +63,7 @@ def camera_of(middle, distance, angle, size):
 
 
 class Times:
-    """Milliseconds of frames; waits: until the GPU has finished, otherwise of the processor and without surfaces."""
+    """Milliseconds of frames; waits: measure until the GPU has finished, otherwise the processor without surfaces."""
 
     def __init__(self, waits):
         self.waits, self.found = waits, []

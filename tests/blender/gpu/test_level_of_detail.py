@@ -53,7 +53,7 @@ def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
 
 
 def test_the_level_of_detail_has_no_scale(many):
-    """Hair in another unit, seen from as many of its diameters, has as many strands and points."""
+    """Hair in another unit, seen from the same number of its diameters, has as many strands and points."""
     view = drawing.view_record(*seen_from(8.0), SIZE)
     steps = steps_of(many, view)
     assert steps.strand_count < 50_000 and steps.point_count < 41
@@ -70,7 +70,7 @@ def test_all_strands_and_points_are_drawn_if_the_artist_asks_for_them(many):
 
 
 def test_distant_strands_have_as_many_points_as_their_bends_need(rng):
-    """Of strands as far away, straight ones have fewer points than bent ones, and those fewer than curls."""
+    """At one distance, straight strands have fewer points than bent strands, and bent strands fewer than curls."""
     along = np.linspace(0.0, 1.0, 41)[:, None]
     roots, points = np.append(rng.uniform(-0.5, 0.5, (20_000, 1, 2)), np.zeros((20_000, 1, 1)), axis=2), []
     for turns, width in ((0.0, 0.0), (1.0, 0.05), (8.0, 0.05)):
@@ -83,7 +83,7 @@ def test_distant_strands_have_as_many_points_as_their_bends_need(rng):
 
 
 def test_near_hair_is_not_reduced(many):
-    """Near hair is drawn by the same numbers, so to the same bits, whether distant hair is reduced or not."""
+    """Near hair is drawn with the same numbers, so the same bits, whether distant hair is reduced or not."""
     near, whole = (steps_from(many, 1.5, is_reduced=is_reduced) for is_reduced in (True, False))
     one, other = (drawing.strand_record(many, uniforms.VIEW.record(), np.eye(4), steps) for steps in (near, whole))
     assert one.tobytes() == other.tobytes()

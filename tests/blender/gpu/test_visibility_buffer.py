@@ -244,7 +244,7 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
 
 
 def test_hair_outside_of_the_view_is_not_rasterized(shading, rng, monkeypatch):
-    """Of a crowd, only the heads in view take time on the GPU; the others change no sample."""
+    """Only the heads of a crowd that are in view take time on the GPU; the other heads change no sample."""
     points, radii = tuft(rng, strand_count=12, thickness=0.02)
     places = [np.diag([0.15, 0.1, 0.1, 1.0]) for _ in range(5)]
     for to_world, x in zip(places, (9.0, 0.1, -9.0, 0.0, 9.0), strict=True):

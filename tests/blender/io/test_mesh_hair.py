@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes of cards and tubes become hair where they are, with their colors; other meshes get one sentence."""
+"""Meshes of cards and tubes become hair where they are, with their colors; other meshes are refused with a sentence."""
 
 import bpy
 import numpy as np
@@ -65,7 +65,7 @@ def test_hair_is_where_the_cards_are(blender, place):
 
 
 def test_roots_are_on_the_posed_surface_of_an_animated_one(head, rng):
-    """Strands follow the surface when it moves on: they keep their roots."""
+    """Strands keep their roots when the surface moves."""
     lines = list(lines_on(head, rng, COUNT, least=8, most=8))
     hair = use(head, card_object(lines, 0.02), strand_count=60)
     starts = curves.curve_offsets(hair.data)[:-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The error of cards is none for the strands themselves, falls with the number of cards, and chooses placements."""
+"""The error of cards is 0 for the strands themselves, falls with the number of cards, and decides placements."""
 
 from dataclasses import replace
 
@@ -72,7 +72,7 @@ def test_more_cards_have_less_error(comparison, strands):
 
 @pytest.mark.parametrize(("scale", "place"), [(0.01, 0.0), (100.0, 0.0), (1.0, 30.0)])
 def test_the_error_does_not_depend_on_unit_and_place(comparison, strands, scale, place):
-    """Cards of scaled or moved strands have the error of the same cards at rest, within rounding."""
+    """Cards of scaled or moved strands have the error of the original cards, within rounding."""
     surface = TriMesh(np.float32(scale * strands.surface.vertices + place), strands.surface.triangles)
     points = np.float32(scale * strands.points + place)
     moved = replace(strands, points=points, radii=np.float32(scale * strands.radii), surface=surface)
@@ -105,4 +105,4 @@ def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, stra
     tried.clear()
     given = CardSettings(card_count=40, crossed=0.25)
     best = best_placement.best_placement(comparison, strands, LEVEL, given, lambda _step, _part: None)
-    assert best[0] == given and len(tried) == 2  # crossed cards are as the settings say
+    assert best[0] == given and len(tried) == 2  # the settings determine the crossed cards

@@ -53,7 +53,7 @@ def test_crossed_cards_stand_at_a_right_angle_on_the_same_line(strands):
     (crossed, _, _) = CardSettings(crossed=1.0).parts_of(30)
     assert crossed == 15
     cosines = np.abs(vectors[15:] @ vectors[:15].T)
-    # One first card of each crossed card is at a right angle to it.
+    # Each crossed card is at a right angle to one of the first cards.
     assert (cosines.min(axis=1) < 0.02).all()
 
 
@@ -85,7 +85,7 @@ def test_caps_lie_at_the_roots_and_show_only_the_roots(strands):
 
 
 def test_textures_show_the_highest_strand(strands):
-    """Segments in textures belong to strands whose places are there."""
+    """Each texel shows a segment of a strand that lies at the texel."""
     made = laid(strands)
     segments = texture_segments(made.strands, 256, 1)
     y, x = np.nonzero(segments != NO_STRAND)

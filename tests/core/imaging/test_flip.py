@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""FLIP has the values of the paper's equations for pictures of one color, and none for equal pictures."""
+"""FLIP has the values of the paper's equations for pictures of one color, and is 0 for equal pictures."""
 
 import math
 

@@ -12,7 +12,7 @@ from ...host.notices import name_of
 
 
 def new_images(name, maps, layout, roughness):
-    """Return {map: image} of `texels.maps` and of a layout, neither packed nor saved; "color" includes alpha.
+    """Return {map: image} of `TexelSums.maps` and of a layout, neither packed nor saved; "color" includes alpha.
 
     name: prefix of image names; layout: of `CardSettings`; roughness: of the look.
     """

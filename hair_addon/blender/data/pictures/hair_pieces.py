@@ -19,9 +19,9 @@ _SHADERS = {"BSDF_PRINCIPLED": "Base Color", "BSDF_DIFFUSE": "Color", "BSDF_HAIR
 
 @dataclass(frozen=True)
 class _Material:
-    """Color, a linear RGBA, and alpha of a material; images replace them.
+    """The linear RGBA color and the alpha of a material, and the images that replace them.
 
-    color_image: `Image`; alpha_image: `Image`, whose alpha is read if is_alpha, else its colors.
+    color_image: `Image`; alpha_image: `Image`, read in its alpha channel if is_alpha, else in its red channel.
     """
 
     color: np.ndarray | None = None

@@ -21,15 +21,15 @@ _KINDS = ("IMAGE", "GROUP", "ATTRIBUTE", "STRAND")  # guides have no clumps
 class VariedDynamics:
     """Maps of the simulation of guides.
 
-    factors: {setting: (G,) float64 factors of its value}; status: a sentence about a missing source, whose setting has
-    its value.
+    factors: {setting: (G,) float64 factors of its value}; status: a sentence about a missing source; the setting
+    of this map keeps its value.
     """
 
     factors: dict[str, np.ndarray] = field(default_factory=dict)
     status: str = ""
 
     def values(self, settings):
-        """Return {setting: (G,) float64} of `DynamicsSettings`."""
+        """Return {setting: (G,) float64 values of guides} for `DynamicsSettings`."""
         return {
             name: combination.within(getattr(settings, name) * factors, VARIED[name])
             for name, factors in self.factors.items()

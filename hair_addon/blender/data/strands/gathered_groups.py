@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gathered guides: attributes of their groups, equal for guides of one tie or lock, and of the part up to the tie.
+"""Gathered guides: attributes for the groups of guides, one for each tie or lock, and for the part up to the tie.
 
-The length of this part is stored too, in local units, because guides may be cut or lengthened behind their ties.
+The length of this part is also stored, in local units, because guides may be cut or lengthened behind their ties.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (_LENGTH, "FLOAT"))
 
 @dataclass(frozen=True)
 class Gathered:
-    """groups (G,) int32: 0 for guides that are not gathered; held (G,) float32: part of the present length up
-    to the tie.
+    """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the part of the present length up to
+    the tie.
     """
 
     groups: np.ndarray
@@ -67,7 +67,7 @@ def scale(datablock, change):
 
 
 def _lengths(datablock):
-    """Return the lengths (G,) float64 of guides, at least a tiny one."""
+    """Return the lengths (G,) float64 of guides, at least 1e-30."""
     points, starts = curves.read_points(datablock), curves.curve_offsets(datablock)
     return np.maximum(geometry.strands.ragged_lengths(np.nan_to_num(points), starts), 1e-30)
 

@@ -23,7 +23,7 @@ def read(datablock, name):
 
 
 def write(datablock, name, are_chosen):
-    """Store the points (N,) of a set, which replace those of a set of this name."""
+    """Store the chosen points (N,) bool as a set; a set of this name is replaced."""
     attributes.write(datablock, _PREFIX + name, "BOOLEAN", "POINT", are_chosen)
 
 
@@ -38,7 +38,7 @@ def selected(datablock):
 
 
 def select(datablock, are_chosen):
-    """Select points (N,) of guides; whole guides if Blender selects whole curves."""
+    """Select points (N,) bool of guides; whole guides if Blender selects whole curves."""
     domain, values = "POINT", are_chosen
     if datablock.selection_domain == "CURVE":
         domain, values = "CURVE", np.logical_or.reduceat(are_chosen, curves.curve_offsets(datablock)[:-1])

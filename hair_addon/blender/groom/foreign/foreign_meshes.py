@@ -18,8 +18,8 @@ def is_hair_mesh_chosen(active: Object | None, selected: Iterable[Object]) -> bo
 def find_surface(mesh_object: Object, view_layer: ViewLayer, selected: Iterable[Object], name: str = "") -> Object:
     """Return the mesh object that the hair of a mesh grows on. Raises `HairError`.
 
-    In order: the mesh object with a given name, the only other mesh among the selected objects, a parent that is a
-    mesh.
+    The surface is the mesh object with a given name, otherwise the only other mesh among the selected objects,
+    otherwise a parent that is a mesh.
     """
     if name:
         found = view_layer.objects.get(name)

@@ -8,7 +8,7 @@ from ....core.errors import HairError
 from ...data.strands import curves, selection_sets
 from ...host.notices import name_of
 
-_MOST_LETTERS = 40  # of a name, as names of attributes are limited
+_MOST_LETTERS = 40  # bytes of a name, as Blender limits the names of attributes
 
 
 def save(guides: Curves, name: str) -> int:

@@ -17,8 +17,8 @@ _GROUP = "Density"
 def paint(hair: Curves, context: Context) -> None:
     """Enter the paint mode of the strand mask of hair, or of its density image.
 
-    Without either, a new vertex group begins as the mask of the guides, or with full weights. Raises `HairError` before
-    anything changes.
+    Without a mask and an image, a new vertex group begins as the mask of the guides, or with full weights. Raises
+    `HairError` before anything changes.
     """
     curves.require_editable(hair)
     surface, settings = hair.surface, hair.vellus.hair

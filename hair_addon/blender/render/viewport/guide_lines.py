@@ -79,7 +79,7 @@ def _frozen_texture(guides):
 
 
 def _hues_texture(guides):
-    """Return a texture with the hue of each guide; None if the colors of guides are not those of numbers."""
+    """Return a texture with the hue of each guide; None if no number determines the colors."""
     find = _HUES.get(guides.vellus.guide_colors)
     if find is None or not len(guides.curves):
         return None
@@ -88,7 +88,7 @@ def _hues_texture(guides):
 
 
 def _hues_of_lengths(guides):
-    """Return hues (G,) from blue for the shortest guide to red for the longest one; green if all are as long."""
+    """Return hues (G,) from blue for the shortest guide to red for the longest one; green if lengths are equal."""
     starts, points = curves.curve_offsets(guides), curves.read_points(guides)
     lengths = strands.ragged_lengths(points, starts)
     least, most = lengths.min(), lengths.max()

@@ -5,7 +5,7 @@ A share runs in a thread and starts with a redraw, so nothing is followed for a 
 processor it pauses while viewports are redrawn. The picture changes from dual scattering to paths in steps. While
 something moves, the measured light stays in its voxels. Its part of the picture decreases with changes of hair, lights
 and looks; its weight relative to new paths also decreases with the angle by which the view has turned. After a turn
-the picture changes from the light that it shows to that of new paths in steps, too, as the first paths are noisy.
+the picture also changes in steps, from its present light to the light of new paths, because the first paths are noisy.
 """
 
 import os
@@ -309,9 +309,9 @@ class LiveLight:
         self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
         self._known = None  # (`_Content`, part) of the textures
         self._grid, self._textures, self._scene = None, (), (None, None)
-        self._means = self._turned = None  # of the textures; of those shown when the view turned
+        self._means = self._turned = None  # of the present textures; of the textures when the view turned
         self._acted, self._tried, self._goal, self._seed = -np.inf, 0, 0, 0
-        self._faded = 0.0  # part of the weight of former paths that the last turn of the view took
+        self._faded = 0.0  # part of the weight of former paths that the last turn of the view removed
         self._is_done = False
 
     @property
@@ -470,10 +470,10 @@ class LiveLight:
         self._means = means
 
     def _new_part(self):
-        """Return how much of the shown light follows the paths since the view turned, from 0 to 1.
+        """Return the part of the shown light that comes from paths since the view turned, from 0 to 1.
 
-        All of it does after a fraction of the paths that make the light known: the weight that the turn took from
-        former paths.
+        The part is 1 after a fraction of the paths that suffice for the light. The fraction is the weight that the turn
+        removed from former paths.
         """
         known = max(self._goal, self._paths.taken * self._paths.wanted)
         return min(self._tried / max(self._faded * min(known, light_paths.MOST_TIMES * self._goal), 1.0), 1.0)

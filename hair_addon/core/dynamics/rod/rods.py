@@ -154,7 +154,7 @@ class Rods:
         """Let the first fraction (S,) of each strand, in [0, 1], only follow the surface.
 
         The held part is rigid up to there: one more segment is held, as the shape between vertices depends on both.
-        pinned: (S,) counts of `pinned_counts` of each strand, None for those of the step.
+        pinned: (S,) `pinned_count` of each strand, None for the count of the step.
         """
         require_count("fractions", np.size(fractions), self.strand_count)
         if not (np.min(fractions) >= 0.0 and np.max(fractions) <= 1.0):
@@ -167,7 +167,7 @@ class Rods:
         self._put("pins", pins[:, None])
 
     def respond(self, damping_times: np.ndarray | None = None, holds: np.ndarray | None = None) -> None:
-        """Give each strand its own damping time (S,) [s] and hold (S,) [1/s²]; None for those of the step."""
+        """Give each strand its own damping time (S,) [s] and hold (S,) [1/s²]; None for the values of the step."""
         rows = []
         for values in (damping_times, holds):
             rows.append(np.full(self.strand_count, -1.0) if values is None else np.asarray(values, np.float64))

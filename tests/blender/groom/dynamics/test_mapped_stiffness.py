@@ -102,7 +102,7 @@ def test_a_constant_map_is_the_value(swung, name):
 
 @pytest.mark.parametrize(("source", "message"), [("group:lost", '"lost"'), ("clump", "Maps of guides")])
 def test_a_map_without_values_is_a_status(swung, tmp_path, source, message):
-    """A setting whose map has a missing source, or a kind that guides do not have, has its value, with a status."""
+    """A setting keeps its value, with a status, if its map has no source or a kind that guides do not have."""
     guides, hair = swung
     value = baked(guides)
     api.set_map(hair, SETTING, source, low=100.0, high=100.0)
@@ -140,7 +140,7 @@ def test_a_map_without_values_does_not_stop_playing(played):
 
 
 def test_a_map_that_changes_during_playback_outdates_earlier_frames(played):
-    """Frames before a new map, or before its weights are painted, are outdated."""
+    """A new map, or painted weights of a map, make earlier frames outdated."""
     guides, hair = played
     name = half_group()
     play(1, 3)
@@ -161,7 +161,7 @@ def test_a_map_that_changes_during_playback_outdates_earlier_frames(played):
 
 
 def test_a_map_outdates_baked_frames(swung):
-    """Baked frames are shown as outdated by a new map and by painted weights, and are up to date without it."""
+    """A new map and painted weights make baked frames outdated; a new bake is up to date."""
     guides, hair = swung
     name, sphere = half_group(), bpy.data.objects["Sphere"]
     baked(guides)

@@ -119,8 +119,8 @@ def test_a_view_that_turns_keeps_the_light(view):
 def test_no_frame_jumps_in_brightness_while_the_view_turns_and_comes_to_rest(view):
     """Over a turn by 90 degrees and the rest after it, the mean level changes by at most 5 % from frame to frame.
 
-    The first redraw after the last motion is as bright as the motion's last frame, and the light ends as that of
-    paths in the new view alone.
+    The first redraw after the last motion is as bright as the last frame of the motion, and the final light is the
+    light of paths in the new view alone.
     """
     camera, read = view
     drawn, live = read(), live_light.LiveLight()
