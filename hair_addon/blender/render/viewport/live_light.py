@@ -383,11 +383,12 @@ class LiveLight:
             request["systems"] = (*light_paths.strands_of(drawn), device)
         if is_other or content is not before[0]:
             request["surroundings"] = light_paths.surroundings_of(drawn)
+            self._means = None  # of other hair, or of other lights
         if "surroundings" in request or not all(map(np.array_equal, camera, before[1])):
             samples = light_paths.SAMPLES_A_PATH * count
             request["shown"] = seen_strands.draw(drawn, camera, window, samples, self._seed)
             self._tried = self._goal = 0
-            self._turned = None if "surroundings" in request else self._means
+            self._turned = self._means
             if before is not None:
                 request["weight"] = content.part_since(before[0]) * _view_weight(camera, before[1], content.centre)
                 request["shift"] = content.centre - before[0].centre

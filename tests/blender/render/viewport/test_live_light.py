@@ -15,6 +15,7 @@ from hair_addon import api
 from hair_addon.blender.data import scene as scene_data
 from hair_addon.blender.render import drawn_scene, light_paths
 from hair_addon.blender.render.viewport import hair_picture, live_light
+from hair_addon.core.long_work import Stopped
 from hair_addon.core.shading.light_paths import gather
 from tests.blender.render.test_light_paths import BROWN, hair_of, light
 
@@ -137,6 +138,30 @@ def test_no_frame_jumps_in_brightness_while_the_view_turns_and_comes_to_rest(vie
     assert np.abs(np.diff(levels) / levels[1:]).max() < 0.05
     alone = picture_of(at_rest(live_light.LiveLight(), drawn, there), there).mean()
     assert levels[-1] == pytest.approx(alone, rel=0.04)
+
+
+def test_hair_that_changes_just_before_the_view_turns_has_its_own_light(view, monkeypatch):
+    """A view that turns before any path of changed hair is followed shows no light of the hair before the change."""
+    camera, read = view
+    live = live_light.LiveLight()
+    at_rest(live, read(), camera)
+    position = bpy.data.hair_curves[0].attributes["position"].data
+    points = np.empty(3 * len(position), np.float32)
+    position.foreach_get("vector", points)
+    position.foreach_set("vector", 1.7 * points)
+    bpy.data.hair_curves[0].update_tag()
+    changed = read()
+    with monkeypatch.context() as patched:
+        patched.setattr(gather.PathSums, "follow", stopped)
+        redrawn(live, changed, camera)
+        redrawn(live, changed, camera)
+        live.wait()
+    found = at_rest(live, changed, turned(camera, 20.0))
+    assert part_of(found) == 1.0
+
+
+def stopped(*_given):
+    raise Stopped
 
 
 def test_changed_lights_are_forgotten(view):
