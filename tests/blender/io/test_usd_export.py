@@ -160,3 +160,14 @@ def test_a_text_file_is_written_once_whatever_its_number_of_frames(rng, tmp_path
     points = stage.GetPrimAtPath("/groom/Long/strands").GetAttribute("points")
     for time, wanted in enumerate(frames, 5):
         np.testing.assert_array_equal(points.Get(time), wanted)
+
+
+def test_files_are_valid(twisted, tmp_path):
+    """USD's checker finds no fault in an exported file."""
+    export(tmp_path / "groom.usdc")
+    stage_of(tmp_path / "groom.usdc")
+    from pxr import UsdUtils
+
+    checker = UsdUtils.ComplianceChecker()
+    checker.CheckCompliance(str(tmp_path / "groom.usdc"))
+    assert (checker.GetErrors(), checker.GetFailedChecks(), checker.GetWarnings()) == ([], [], [])

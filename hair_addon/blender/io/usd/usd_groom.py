@@ -6,7 +6,7 @@
     /groom/<group>/strands     BasisCurves
     /groom/<group>/guides      BasisCurves with the purpose guide
     /groom/<group>_instance    Xform, an instance of the group: where another object shows the same hair
-    /groom/materials/<group>   Material: a preview surface, and the settings of the look as inputs
+    /groom/materials/<group>   Material: a preview surface, a MaterialX network, and the look's settings as inputs
 
 Primvars with the prefix groom_ are those of [UnrealGroom26], except the width, which is the curves' own; st and
 displayColor are for other programs.
@@ -21,28 +21,13 @@ from ....core.files import groom_curves
 from ....core.files.alembic.unreal_groom import VERSION
 from ....core.files.atomic_file import new_partial_of
 from ....core.files.groom_curves import Check
-from ....core.shading import appearance
-from . import hair_file
+from . import hair_file, usd_materials
 
 PER_METRE = 1.0
 
 MATERIALS = "materials"  # scope of materials: a reserved group name
 
 _ROOT = "/groom"
-
-# Settings of a look that a material carries: name → type.
-_HAIR_INPUTS = {
-    "melanin": "Float",
-    "redness": "Float",
-    "tint": "Color3f",
-    "roughness": "Float",
-    "radial_roughness": "Float",
-    "coat": "Float",
-    "ior": "Float",
-    "cuticle_angle": "Float",
-    "random_color": "Float",
-    "random_roughness": "Float",
-}
 
 
 class UsdGroomWriter:
@@ -71,9 +56,16 @@ class UsdGroomWriter:
         if curves.is_guide:
             made.CreatePurposeAttr(UsdGeom.Tokens.guide)
         elif curves.look is not None:
-            _bind_material(self._stage, made.GetPrim(), curves)
+            self._bind_material(made.GetPrim(), curves)
         self._added.append((made, Check(curves), moves, float(widths.max(initial=0.0)) / 2.0, []))
         return len(self._added) - 1
+
+    def _bind_material(self, prim, curves):
+        from pxr import UsdGeom, UsdShade
+
+        scope = UsdGeom.Scope.Define(self._stage, f"{_ROOT}/{MATERIALS}").GetPath()
+        material = usd_materials.define_material(self._stage, scope.AppendChild(curves.group_name), curves.look)
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
 
     def write_points(self, number, points):
         """Write points (N, 3) [m] of added curves at the next time. Raises `HairError` for non-finite values."""
@@ -167,26 +159,6 @@ def _write_primvars(prim, curves):
     if curves.roughness is not None:
         roughness = _array("FloatArray", _all(curves.roughness, curves))
         _primvar(prim, "groom_roughness", "FloatArray", "vertex", roughness)
-
-
-def _bind_material(stage, prim, curves):
-    """Give strands a material: a preview surface for every program, and the look's settings for hair shaders."""
-    from pxr import Sdf, UsdGeom, UsdShade
-
-    path = f"{UsdGeom.Scope.Define(stage, f'{_ROOT}/{MATERIALS}').GetPath()}/{curves.group_name}"
-    material = UsdShade.Material.Define(stage, path)
-    for name, kind in _HAIR_INPUTS.items():
-        value = getattr(curves.look, name)
-        material.CreateInput(name, getattr(Sdf.ValueTypeNames, kind)).Set(tuple(value) if kind == "Color3f" else value)
-    absorption = appearance.sigma_a(curves.look)
-    material.CreateInput("absorption", Sdf.ValueTypeNames.Float3).Set(absorption)
-    shader = UsdShade.Shader.Define(stage, f"{path}/surface")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    color = tuple(map(float, appearance.mean_color(curves.look)))
-    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(color)
-    shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(curves.look.roughness)
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
 
 
 def _primvar(prim, name, kind, scope, value):

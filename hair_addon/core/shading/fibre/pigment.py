@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from .angles import Values
 
 # Absorption of unit concentrations for red, green and blue [DEon11], in the scale of Cycles.
-_EUMELANIN = np.array([0.506, 0.841, 1.653])
-_PHEOMELANIN = np.array([0.343, 0.733, 1.924])
+EUMELANIN = np.array([0.506, 0.841, 1.653])
+PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
 FITTED_IOR = 1.55  # of the fibers to which [Chiang16] fitted colors
 
@@ -27,7 +27,7 @@ def sigma_a_from_melanin(melanin: Values, redness: Values) -> np.ndarray:
     """Return sigma_a (..., 3) per fiber radius of an amount of pigment and its red share, both (...) in [0, 1]."""
     concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), LEAST_LIGHT))[..., None]
     redness = np.asarray(redness, float)[..., None]
-    return concentration * ((1.0 - redness) * _EUMELANIN + redness * _PHEOMELANIN)
+    return concentration * ((1.0 - redness) * EUMELANIN + redness * PHEOMELANIN)
 
 
 def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
