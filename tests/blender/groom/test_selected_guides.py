@@ -47,6 +47,25 @@ def test_a_saved_selection_comes_back(guides, domain):
     assert selection_sets.names(guides) == ["Fringe"]
 
 
+def test_all_and_no_selected_points_are_extended_and_reduced_as_others(guides):
+    """All points stay selected when a set extends them; a set is taken away from all, and not from none."""
+    choose(guides, [1, 2])
+    bpy.ops.vellus.save_selection(name="Left")
+    left = selection_sets.selected(guides)
+    for is_stored in (True, False):
+        for mode, wanted in (("ADD", np.ones_like(left)), ("REMOVE", ~left)):
+            choose(guides, range(len(guides.curves)))
+            if not is_stored:  # Blender stores no selection if all is selected
+                guides.attributes.remove(guides.attributes[".selection"])
+            bpy.ops.vellus.select_saved(name="Left", mode=mode)
+            np.testing.assert_array_equal(selection_sets.present(guides), wanted)
+    choose(guides, [])
+    with pytest.raises(RuntimeError, match="No point"):
+        bpy.ops.vellus.select_saved(name="Left", mode="REMOVE")
+    bpy.ops.vellus.select_saved(name="Left", mode="ADD")
+    np.testing.assert_array_equal(selection_sets.selected(guides), left)
+
+
 def test_selections_move_no_guide_and_outlast_removed_guides(guides):
     """Saving and selecting changes no point; guides that stay are in the same sets after others are removed."""
     before = attributes.read(guides, "position", "FLOAT_VECTOR", "POINT")
@@ -66,6 +85,7 @@ def test_what_cannot_be_saved_or_selected_is_one_sentence(guides):
         (lambda: bpy.ops.vellus.select_saved(name="None"), 'no selection "None"'),
         (lambda: bpy.ops.vellus.remove_selection(name="None"), 'no selection "None"'),
         (lambda: bpy.ops.vellus.save_selection(name="x" * 60), "at most 40 letters"),
+        (lambda: bpy.ops.vellus.save_selection(name="é" * 30), "at most 20 letters"),
     ]:
         with pytest.raises(RuntimeError, match=sentence):
             call()

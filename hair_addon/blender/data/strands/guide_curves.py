@@ -33,13 +33,20 @@ def selected_points(curves, starts):
     """Return (N,) bool: the points that are at least half selected; None if all or none are. starts (S+1,): as
     above.
     """
+    found = stored_selection(curves, starts)
+    return found if found is not None and found.any() and not found.all() else None
+
+
+def stored_selection(curves, starts):
+    """Return (N,) bool: the points that are at least half selected; None if all are, because Blender stores no
+    selection. starts (S+1,): as above.
+    """
     for data_type in ("BOOLEAN", "FLOAT"):
         for domain in (_POINTS, _CURVES):
             values = attributes.read(curves, SELECTION, data_type, domain)
             if values is not None:
                 found = values.astype(np.float32) >= 0.5
-                found = np.repeat(found, np.diff(starts)) if domain == _CURVES else found
-                return found if found.any() and not found.all() else None
+                return np.repeat(found, np.diff(starts)) if domain == _CURVES else found
     return None
 
 

@@ -37,6 +37,12 @@ def selected(datablock):
     return guide_curves.selected_points(datablock, curves.curve_offsets(datablock))
 
 
+def present(datablock):
+    """Return (N,) bool: the points that are selected in Sculpt Mode or Edit Mode."""
+    stored = guide_curves.stored_selection(datablock, curves.curve_offsets(datablock))
+    return np.ones(len(datablock.points), bool) if stored is None else stored
+
+
 def select(datablock, are_chosen):
     """Select points (N,) bool of guides; whole guides if Blender selects whole curves."""
     domain, values = "POINT", are_chosen

@@ -1,22 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Named selections of guides, which are saved and selected again."""
 
-import numpy as np
 from bpy.types import Curves
 
 from ....core.errors import HairError
 from ...data.strands import curves, selection_sets
 from ...host.notices import name_of
 
-_MOST_LETTERS = 40  # bytes of a name, as Blender limits the names of attributes
+_MOST_BYTES = 40  # of a name, as Blender limits the names of attributes
 
 
 def save(guides: Curves, name: str) -> int:
     """Save the selected points of guides as a set; returns their number. Raises `HairError`."""
     _require_editable(guides)
     name = name.strip()
-    if not name or len(name.encode()) > _MOST_LETTERS:
-        raise HairError("Give the selection a name of at most {most} letters.", most=_MOST_LETTERS)
+    if not name or len(name.encode()) > _MOST_BYTES:
+        most = len(name.encode()[:_MOST_BYTES].decode(errors="ignore")) or _MOST_BYTES
+        raise HairError("Give the selection a name of at most {most} letters.", most=most)
     selected = selection_sets.selected(guides)
     if selected is None:
         raise HairError("Select guides, or points of guides, in Sculpt Mode or Edit Mode first.")
@@ -31,10 +31,10 @@ def select(guides: Curves, name: str, mode: str = "SET") -> int:
     """
     _require_editable(guides)
     chosen = _points_of(guides, name)
-    present = selection_sets.selected(guides)
-    if present is None or mode == "SET":
-        present = np.full(len(chosen), mode == "REMOVE")
-    selected = present & ~chosen if mode == "REMOVE" else present | chosen
+    selected = chosen
+    if mode != "SET":
+        present = selection_sets.present(guides)
+        selected = present & ~chosen if mode == "REMOVE" else present | chosen
     if not selected.any():
         raise HairError("No point of the guides would be selected.")
     selection_sets.select(guides, selected)
