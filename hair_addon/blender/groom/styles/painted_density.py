@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The density of strands, painted on the surface with Blender's brushes."""
 
-import bpy
 import numpy as np
 from bpy.types import Context, Curves
 
@@ -27,12 +26,13 @@ def paint(hair: Curves, context: Context) -> None:
         raise HairError('"{name}" is kept unchanged: regenerate the strands first.', name=name_of(hair))
     mask, image = text_of(settings, "density_group"), text_of(settings, "density_image")
     if not mask and image:
-        painted_masks.set_canvas(_image(image), context)
+        painted_masks.set_canvas(painted_masks.canvas_of(surface, image), context)
         painted_masks.enter(surface, "TEXTURE_PAINT", context)
         return
     if mask and mask not in surface.vertex_groups:
-        sentence = 'The mask "{mask}" is not a vertex group or color attribute: clear it to paint a new one.'
-        raise HairError(sentence, mask=mask)
+        surface.data.color_attributes.active_color = _color_attribute(surface, mask)
+        painted_masks.enter(surface, "VERTEX_PAINT", context)
+        return
     inherited = "" if mask else _mask_of_guides(hair)
     group = surface.vertex_groups.get(mask) or _new_group(surface, inherited)
     surface.vertex_groups.active = group
@@ -43,11 +43,12 @@ def paint(hair: Curves, context: Context) -> None:
         settings.density_group = name_of(group)
 
 
-def _image(name):
-    found = bpy.data.images.get(name)
+def _color_attribute(surface, mask):
+    """Return the color attribute of a mask. Raises `HairError`."""
+    found = surface.data.color_attributes.get(mask)
     if found is None:
-        raise HairError('There is no image "{name}": pick another image, or clear the field.', name=name)
-    curves.require_editable(found)
+        sentence = 'The mask "{mask}" is not a vertex group or color attribute: clear it to paint a new one.'
+        raise HairError(sentence, mask=mask)
     return found
 
 

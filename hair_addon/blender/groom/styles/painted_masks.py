@@ -34,7 +34,7 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     mask, attribute = group.mask, surface.data.color_attributes.get(group.mask)
     if not mask and group.mask_image:
         mode = "TEXTURE_PAINT"
-        set_canvas(_canvas(surface, group.mask_image), context)
+        set_canvas(canvas_of(surface, group.mask_image), context)
     elif mask and attribute is not None and mask not in surface.vertex_groups:
         mode = "VERTEX_PAINT"
         surface.data.color_attributes.active_color = attribute
@@ -126,8 +126,8 @@ def _has_attribute(hair, name):
     return name in hair.surface.data.attributes or (guides is not None and name in guides.attributes)
 
 
-def _canvas(surface, name):
-    """Return the image to paint. Raises `HairError`."""
+def canvas_of(surface: Object, name: str) -> Image:
+    """Return the image of a name to paint on a surface. Raises `HairError` without an image or a UV map."""
     image = bpy.data.images.get(name)
     if image is None:
         raise HairError('There is no image "{name}": pick another image, or clear the field.', name=name)

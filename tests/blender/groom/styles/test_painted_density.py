@@ -58,3 +58,29 @@ def test_painting_begins_with_the_mask_of_the_guides(hair):
     make_active("Hair")
     with pytest.raises(RuntimeError, match="not a vertex group"):
         bpy.ops.vellus.paint_density()
+
+
+def test_a_color_attribute_is_painted_as_colors(hair):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.data.color_attributes.new("Fur", "FLOAT_COLOR", "POINT")
+    sphere.data.color_attributes.active_color = sphere.data.color_attributes.new("Other", "FLOAT_COLOR", "POINT")
+    hair.data.vellus.hair.density_group = "Fur"
+    make_active("Hair")
+    bpy.ops.vellus.paint_density()
+    assert (sphere.mode, sphere.data.color_attributes.active_color.name) == ("VERTEX_PAINT", "Fur")
+    bpy.ops.vellus.paint_density()
+    assert sphere.mode == "OBJECT" and "Density" not in sphere.vertex_groups
+
+
+def test_an_image_is_painted_on_a_surface_with_a_uv_map(hair):
+    sphere = bpy.data.objects["Sphere"]
+    hair.data.vellus.hair.density_image = bpy.data.images.new("Density", 8, 8).name
+    make_active("Hair")
+    bpy.ops.vellus.paint_density()
+    assert sphere.mode == "TEXTURE_PAINT"
+    bpy.ops.vellus.paint_density()
+    while sphere.data.uv_layers:
+        sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    with pytest.raises(RuntimeError, match="no UV map"):
+        bpy.ops.vellus.paint_density()
+    assert sphere.mode == "OBJECT"
