@@ -8,7 +8,9 @@ from mathutils import Euler, Matrix
 
 from hair_addon import api
 from hair_addon.blender.data.strands import attributes, curves
+from hair_addon.blender.io import mesh_hair
 from hair_addon.core.errors import HairError
+from hair_addon.core.long_work import no_progress
 from tests.support import placed_hair
 from tests.support.commands import run_here
 from tests.support.exchange.card_meshes import card_object
@@ -120,6 +122,20 @@ def test_colors_of_the_mesh_become_those_of_strands(sphere, cards):
     cards.data.materials.append(material)
     cards.hide_set(False)
     np.testing.assert_allclose(colors_of(use(sphere, cards, **EXACT)), wanted[::-1, :3], atol=1e-3)
+
+    # A computation in a thread reads none of Blender's data: the image may be removed in the meantime.
+    work = mesh_hair.using_mesh(
+        cards,
+        sphere,
+        bpy.context.evaluated_depsgraph_get(),
+        api.MeshStrandSettings(strand_count=COUNT),
+        api.DerivationSettings(guide_count=GUIDES),
+    )
+    compute = next(work)
+    texture.image = bpy.data.images.new("Other", 1, 1)
+    bpy.data.images.remove(image)
+    np.testing.assert_allclose(compute(no_progress)[1], wanted[::-1, :3], atol=1e-3)
+    work.close()
 
     links.remove(shader.inputs["Base Color"].links[0])
     cards.data.color_attributes.remove(layer)

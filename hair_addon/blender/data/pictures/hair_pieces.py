@@ -2,7 +2,6 @@
 """Meshes of hair cards, tubes and locks as arrays, with the colors and the alpha of their materials."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -21,14 +20,15 @@ _SHADERS = {"BSDF_PRINCIPLED": "Base Color", "BSDF_DIFFUSE": "Color", "BSDF_HAIR
 class _Material:
     """The linear RGBA color and the alpha of a material, and the images that replace them.
 
-    color_image: `Image`; alpha_image: `Image`, read in its alpha channel if is_alpha, else in its red channel.
+    color_image, alpha_image: {UDIM tile, or None: (H, W, C) pixels} of `image_pixels.read`; alpha_channel: of
+    alpha_image.
     """
 
     color: np.ndarray | None = None
-    color_image: Any = None
+    color_image: dict | None = None
     alpha: float = 1.0
-    alpha_image: Any = None
-    is_alpha: bool = True
+    alpha_image: dict | None = None
+    alpha_channel: int = 3
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,8 @@ class HairPieces:
     def has_colors(self) -> bool:
         """Whether all pieces have a color."""
         used = [self.materials[slot] for slot in np.unique(self.slots)]
-        has_uvs = self.corner_uvs is not None
-        return all(
-            (one.color_image is not None and has_uvs) or self.corner_colors is not None or one.color is not None
-            for one in used
-        )
+        has_own = self.corner_colors is not None
+        return has_own or all(one.color_image is not None or one.color is not None for one in used)
 
     def colors(self, places: SurfacePoints) -> np.ndarray:
         """Return (N, 4) float64 at places on the mesh: linear colors multiplied by alpha, and alpha."""
@@ -67,10 +64,9 @@ class HairPieces:
             rows, material = np.flatnonzero(slots == slot), self.materials[slot]
             color, alpha = np.ones((len(rows), 3)), np.full(len(rows), material.alpha)
             if uvs is not None and material.alpha_image is not None:
-                alpha *= _alpha(material, uvs[rows])
+                alpha *= _sampled(material.alpha_image, uvs[rows])[:, material.alpha_channel]
             if uvs is not None and material.color_image is not None:
-                sampled = _sampled(image_pixels.read(material.color_image, True), uvs[rows])
-                color = pixels.unpremultiplied(sampled)[0]
+                color = pixels.unpremultiplied(_sampled(material.color_image, uvs[rows]))[0]
             elif self.corner_colors is not None:
                 corners = self.corner_colors[places.triangle[rows], :, :3]
                 color = np.einsum("nc,ncv->nv", weights[rows], corners)
@@ -78,12 +74,6 @@ class HairPieces:
                 color[:] = material.color[:3]
             found[rows, :3], found[rows, 3] = color * alpha[:, None], alpha
         return found
-
-
-def _alpha(material, uvs):
-    if material.is_alpha:
-        return _sampled(image_pixels.read(material.alpha_image, True), uvs)[:, 3]
-    return _sampled(image_pixels.read(material.alpha_image, False), uvs)[:, 0]
 
 
 def _sampled(tiles, uvs):
@@ -114,14 +104,16 @@ def read(mesh_object, depsgraph) -> HairPieces:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
         polygons = np.searchsorted(faces.starts, corners[:, 0], side="right") - 1
-        materials = [_read_material(slot.material) for slot in evaluated.material_slots] or [_Material()]
+        present = [slot.material for slot in evaluated.material_slots] or [None]
+        slots, corner_uvs = np.clip(slots[polygons], 0, len(present) - 1), _corner_uvs(mesh, corners)
+        used, has_uvs = set(np.unique(slots).tolist()), corner_uvs is not None
         return HairPieces(
             scene.vertex_positions(mesh),
             faces.corner_vertices[corners],
-            _corner_uvs(mesh, corners),
+            corner_uvs,
             _corner_colors(mesh, faces, corners),
-            materials,
-            np.clip(slots[polygons], 0, len(materials) - 1),
+            [_read_material(one, has_uvs) if slot in used else _Material() for slot, one in enumerate(present)],
+            slots,
         )
     finally:
         evaluated.to_mesh_clear()
@@ -146,8 +138,11 @@ def _corner_colors(mesh, faces, corners):
     return np.maximum(np.where(np.isfinite(found), found, np.float32(0.0)), 0.0)
 
 
-def _read_material(material):
-    """Return the `_Material` of a Blender material, by its first shader of `_SHADERS`."""
+def _read_material(material, has_uvs):
+    """Return the `_Material` of a Blender material, by its first shader of `_SHADERS`. Raises `HairError`.
+
+    has_uvs: whether the mesh has UV coordinates; without them, no image is read.
+    """
     if material is None:
         return _Material()
     shaders = [] if material.node_tree is None else [n for n in material.node_tree.nodes if n.type in _SHADERS]
@@ -157,8 +152,13 @@ def _read_material(material):
     image, _ = _image_before(color)
     alpha_image, output = (None, "") if alpha is None else _image_before(alpha)
     constant = 1.0 if alpha is None or alpha.is_linked else float(alpha.default_value)
+    is_alpha = output == "Alpha"
     return _Material(
-        None if color.is_linked else np.array(color.default_value), image, constant, alpha_image, output == "Alpha"
+        None if color.is_linked else np.array(color.default_value),
+        image_pixels.read(image, True) if has_uvs and image is not None else None,
+        constant,
+        image_pixels.read(alpha_image, is_alpha) if has_uvs and alpha_image is not None else None,
+        3 if is_alpha else 0,
     )
 
 
