@@ -21,6 +21,7 @@ _FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
 _PIECE_LENGTH, _GREATEST_BEND = 2.0, 0.5
 
 _LEAST_STRANDS, _LEAST_POINTS = 2000, 9
+_INSIDE = 1e15  # samples per unit for a viewer inside of the hair: finite, as strands may have no width or length
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,11 @@ def _points_that_show(strands, length):
 def _sizes_in(view, placed):
     """Return [(samples per unit at the nearest strand, diameter [samples])] of [(`StrandsOnGPU`, object to world)].
 
-    Both are infinite if the viewer is inside of the hair's sphere.
+    Both are very large if the viewer is inside of the hair's sphere.
     """
     centres, radii = drawing.bounding_spheres(placed)
     per_unit = np.full(len(placed), float(view["pixels_per_unit"]))
     if view["is_perspective"]:
         distances = np.linalg.norm(view["eye"][:3] - centres, axis=1) - radii
-        per_unit = np.divide(per_unit, distances, out=np.full(len(placed), np.inf), where=distances > 0.0)
+        per_unit = np.divide(per_unit, distances, out=np.full(len(placed), _INSIDE), where=distances > 0.0)
     return list(zip(per_unit.tolist(), (2.0 * radii * per_unit).tolist(), strict=True))

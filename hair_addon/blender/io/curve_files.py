@@ -13,6 +13,7 @@ from ...core.files import alembic, array_grooms, curve_file, curve_units
 from ...core.files.curve_file import Convention, Motion
 from ...core.files.strands import counted_points, hair, obj_lines, ply_strands, tressfx
 from ...core.geometry.strands import curve_offsets
+from ..data import whole_changes
 from ..host import scene_time
 from . import curve_objects
 from .usd import usd_curves
@@ -174,7 +175,8 @@ def groups_of(path, wanted, surface_object):
     if path.suffix.lower() == ".blend":
         raise HairError("{path} is a .blend file, which has objects instead of groups: name one.", path=path)
     parts = parts_of(path, read(path, wanted.axis), wanted, surface_object)
-    return [made_of(path, part, of_part, surface_object) for part, of_part in parts]
+    with whole_changes.whole_change():
+        return [made_of(path, part, of_part, surface_object) for part, of_part in parts]
 
 
 def parts_of(path, file, wanted, surface_object):

@@ -213,3 +213,11 @@ def test_each_head_of_a_crowd_is_as_bright_and_covers_as_much_as_with_all_strand
     state.is_reduced_in_viewport = False
     whole = heads_in(columns)
     np.testing.assert_allclose(some, whole, rtol=0.0, atol=2.0 / 255.0)
+
+
+def test_strands_without_width_or_length_are_drawn_around_the_viewer(blender):
+    """A viewer inside of hair whose strands have no width, or no length, sees it without an error."""
+    points = np.random.default_rng(0).random((3000, 9, 3)).astype(np.float32) - 0.5
+    thin = strand_textures.upload_strands(points, np.zeros(points.shape[:2], np.float32))
+    short = strand_textures.upload_strands(np.repeat(points[:, :1], 9, axis=1), np.full((3000, 9), 1e-4, np.float32))
+    assert steps_from(thin, 0.0).point_count == 9 and steps_from(short, 0.0).strand_count == 3000

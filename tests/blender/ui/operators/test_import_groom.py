@@ -8,7 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data.strands import attributes, exported_curves
 from hair_addon.blender.groom.foreign import kept_hair
-from hair_addon.blender.io import curve_files
+from hair_addon.blender.io import curve_files, curve_objects
 from hair_addon.blender.ui import menus, panels
 from hair_addon.core.errors import HairError
 from tests.support.commands import run_here
@@ -190,6 +190,23 @@ def test_groups_are_all_imported_or_none(two_systems, monkeypatch):
     with pytest.raises(RuntimeError, match="No room"):
         bpy.ops.vellus.import_groom(filepath=str(path), by_group=True)
     assert sorted(bpy.data.objects.keys()) == before and len(used) == 2
+
+
+def test_scripts_get_all_groups_or_none(two_systems, monkeypatch):
+    _wanted, path = two_systems
+    before, made = sorted(bpy.data.objects.keys()), []
+
+    def failing(*given, **options):
+        made.append(new_object(*given, **options))
+        if len(made) == 3:
+            raise HairError("No room.")
+        return made[-1]
+
+    new_object = curve_objects.new_object
+    monkeypatch.setattr(curve_objects, "new_object", failing)
+    with pytest.raises(HairError, match="No room"):
+        api.import_groups(path, bpy.data.objects["Sphere"])
+    assert sorted(bpy.data.objects.keys()) == before
 
 
 def test_scripts_and_the_command_line_read_groups_too(two_systems, tmp_path):
