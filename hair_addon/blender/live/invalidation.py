@@ -20,7 +20,7 @@ from ..host import notices
 from ..layers import recording
 from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
-from ..render.viewport import live_light, region_pictures, viewport
+from ..render.viewport import guide_lines, live_light, region_pictures, viewport
 from ..settings import animated
 from . import (
     dynamics_state,
@@ -103,6 +103,7 @@ OTHERS = (
     notices.printed_cache,
     world_panoramas.process_cache,
     world_panoramas.last_cache,
+    guide_lines.hue_cache,
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs

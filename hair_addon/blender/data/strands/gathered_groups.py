@@ -30,10 +30,16 @@ class Gathered:
         return Gathered(self.groups[chosen], self.held[chosen])
 
 
+def groups_of(datablock):
+    """Return the groups (G,) int32 of guides; None if no guide is gathered."""
+    groups = attributes.read(datablock, NAME, "INT", "CURVE")
+    return None if groups is None or not groups.any() else groups
+
+
 def read(datablock):
     """Return the `Gathered` of guides; None if no guide is gathered."""
-    groups = attributes.read(datablock, NAME, "INT", "CURVE")
-    if groups is None or not groups.any():
+    groups = groups_of(datablock)
+    if groups is None:
         return None
     held = attributes.read(datablock, HELD, "FLOAT", "CURVE")
     held = np.zeros(len(groups), np.float32) if held is None else np.clip(np.nan_to_num(held), 0.0, 1.0)

@@ -10,11 +10,12 @@ import bpy
 import numpy as np
 
 from ....core.errors import HairError
-from ....core.geometry import strands
+from ....core.geometry import fingerprint, strands
 from ...data import scene
 from ...data.strands import curves, frozen_points, gathered_groups
 from ...gpu import drawing, strand_textures
 from ...gpu.programs import scene_programs, uniforms
+from ...host.caches import Cache
 from ...host.notices import name_of
 from ...materials import looks
 from .. import hair_cache
@@ -25,6 +26,9 @@ FROZEN_PLACES = 32  # of a guide at which the viewport knows whether it is froze
 _PLAIN = (0.72, 0.86, 1.0)
 _SHORT_HUE = 2.0 / 3.0  # blue; 0 is red
 _GOLDEN = 0.61803399  # steps that give neighboring numbers distinct hues
+
+
+hue_cache = Cache(capacity=8)  # session_uid of guide Curves → ((fingerprint of points, offsets), texture of hues)
 
 
 def shown(context) -> list:
@@ -80,17 +84,30 @@ def _frozen_texture(guides):
 
 def _hues_texture(guides):
     """Return a texture with the hue of each guide; None if no number determines the colors."""
-    find = _HUES.get(guides.vellus.guide_colors)
-    if find is None or not len(guides.curves):
+    if not len(guides.curves):
         return None
-    values = find(guides)
+    if guides.vellus.guide_colors == "TIE":
+        return _numbers_texture(_hues_of_ties(guides))
+    if guides.vellus.guide_colors != "LENGTH":
+        return None
+    starts, points = curves.curve_offsets(guides), curves.read_points(guides)
+    source, known = (fingerprint.fingerprint(points), starts.tobytes()), hue_cache.get(guides.session_uid)
+    if known is None or known[0] != source:
+        hues = _hues_of_lengths(strands.ragged_lengths(points, starts))
+        known = hue_cache.keep(guides.session_uid, (source, _numbers_texture(hues)))
+    return known[1]
+
+
+def _numbers_texture(values):
     return strand_textures.numbers_texture(values, min(strand_textures.TEXTURE_WIDTH, len(values)))
 
 
-def _hues_of_lengths(guides):
-    """Return hues (G,) from blue for the shortest guide to red for the longest one; green if lengths are equal."""
-    starts, points = curves.curve_offsets(guides), curves.read_points(guides)
-    lengths = strands.ragged_lengths(points, starts)
+def _hues_of_lengths(lengths):
+    """Return hues (G,) from blue for the shortest guide to red for the longest one; green if lengths are equal.
+
+    lengths: (G,), zero in place of NaN.
+    """
+    lengths = np.nan_to_num(lengths)
     least, most = lengths.min(), lengths.max()
     part = np.full(len(lengths), 0.5) if most - least <= 1e-4 * most else (lengths - least) / (most - least)
     return _SHORT_HUE * (1.0 - part)
@@ -98,13 +115,10 @@ def _hues_of_lengths(guides):
 
 def _hues_of_ties(guides):
     """Return hues (G,) of the ties and locks of gathered guides; -1 for the others, which have the plain color."""
-    gathered = gathered_groups.read(guides)
-    if gathered is None:
+    groups = gathered_groups.groups_of(guides)
+    if groups is None:
         return np.full(len(guides.curves), -1.0)
-    return np.where(gathered.groups > 0, gathered.groups * _GOLDEN % 1.0, -1.0)
-
-
-_HUES = {"LENGTH": _hues_of_lengths, "TIE": _hues_of_ties}
+    return np.where(groups > 0, groups * _GOLDEN % 1.0, -1.0)
 
 
 def _color_of(guides):

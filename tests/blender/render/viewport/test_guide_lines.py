@@ -125,6 +125,20 @@ def test_guides_are_colored_by_their_length(guides):
     assert mostly_short[2] > mostly_short[0] and mostly_long[0] > mostly_long[2]
 
 
+def test_colors_of_lengths_are_computed_once_per_change(guides, monkeypatch):
+    """A redraw that nothing changed computes no lengths; changed guides have new colors."""
+    guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "LENGTH"
+    measured, real = [], ragged_lengths
+    monkeypatch.setattr(guide_lines.strands, "ragged_lengths", lambda *given: measured.append(1) or real(*given))
+    points = curves.read_points(guides.data)
+    before = read(guides)
+    np.testing.assert_array_equal(read(guides), before)
+    assert len(measured) == 1
+    points[0] += 0.3
+    write_points(guides, points)
+    assert np.abs(read(guides) - before).max() > 0.1 and len(measured) == 2
+
+
 def test_guides_of_a_tie_share_a_color(guides):
     """Gathered guides have a color for each tie, others the plain one."""
     guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "PLAIN"
