@@ -137,10 +137,19 @@ def _outermost(points, features, clump_count, count):
     middles, sizes = clusters.cluster_means(points, labels, clump_count), np.bincount(labels)
     away = np.linalg.norm(points - middles[labels], axis=-1).mean(axis=1)
     away *= sizes[labels] / np.maximum(sizes[labels] - 1, 1)  # distance from the middle of the other strands
+    centers = middles.mean(axis=1, dtype=np.float64)
     for strand in np.flatnonzero(sizes[labels] == 1) if clump_count > 1 else ():
-        others = np.delete(middles, labels[strand], axis=0)
-        away[strand] = np.linalg.norm(points[strand] - others, axis=-1).mean(axis=1).min()
+        # Lines are at least as far apart as their centers, so that few of them are compared point by point.
+        least = np.linalg.norm(points[strand].mean(axis=0, dtype=np.float64) - centers, axis=-1)
+        least[labels[strand]] = np.inf
+        most = _distances(points[strand], middles[[least.argmin()]])[0]
+        away[strand] = _distances(points[strand], middles[least <= max(1.00001 * most, least.min())]).min()
     return np.sort(np.argsort(-away, kind="stable")[:count])
+
+
+def _distances(line, lines):
+    """Return mean distances (N,) between the points of a line (P, 3) and those of lines (N, P, 3)."""
+    return np.linalg.norm(line - lines, axis=-1).mean(axis=1)
 
 
 def _second(points, part, count):

@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 
+from hair_addon.core.cards import card_layout
 from hair_addon.core.cards.card_layout import CardStrands, Placement, laid_cards, texture_segments
 from hair_addon.core.cards.card_settings import CardSettings, Level
 from hair_addon.core.cards.texels import NO_STRAND
+from hair_addon.core.geometry.search import clusters
 from tests.core.cards.conftest import sphere, wavy_hair
 
 LEVEL = Level(30, 4, 256)
@@ -45,6 +47,22 @@ def test_some_cards_are_clumps_whatever_the_parts(count, parts):
     )
     assert min(crossed, flyaways, caps) >= 0 and crossed <= count - crossed - flyaways - caps
     assert count - crossed - flyaways - caps >= 1
+
+
+def test_flyaways_are_far_from_the_nearest_other_strand_by_few_comparisons(monkeypatch):
+    """Of strands in clumps of their own, those farthest from the nearest other clump are flyaways; few are compared."""
+    points, compared = wavy_hair(np.random.default_rng(5), 200, 13), []
+
+    def counted(line, lines):
+        compared.append(len(lines))
+        return distances(line, lines)
+
+    distances = card_layout._distances
+    monkeypatch.setattr(card_layout, "_distances", counted)
+    found = card_layout._outermost(points, clusters.strand_features(points), 200, 20)
+    apart = np.stack([distances(line, points) for line in points]) + np.diag(np.full(200, np.inf))
+    assert sorted(found) == sorted(np.argsort(-apart.min(axis=1), kind="stable")[:20])
+    assert sum(compared) < 0.3 * 200 * 199
 
 
 def test_crossed_cards_stand_at_a_right_angle_on_the_same_line(strands):
