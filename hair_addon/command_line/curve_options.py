@@ -72,7 +72,7 @@ def checked(given):
     if given.guides_from and given.hair_from:
         raise HairError("--guides-from and --hair-from exclude each other.")
     if given.from_mesh and came_from:
-        raise HairError("--from-mesh has the hair: leave out --guides-from and --hair-from.")
+        raise HairError("--from-mesh excludes --guides-from and --hair-from.")
     if (given.mesh_roots or given.fill_thickness) and not given.from_mesh:
         raise HairError("--mesh-roots and --fill-thickness need --from-mesh.")
     for name in ("object", "unit", "by_group"):

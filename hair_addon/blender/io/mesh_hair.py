@@ -53,7 +53,7 @@ class MeshHair:
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """Return [(sentence, values)] to report to the user."""
-        sentence = "{count} parts of the mesh are neither cards, tubes nor slender locks: they were left out."
+        sentence = "{count} parts of the mesh were left out: they are no cards, tubes or slender locks, or too large."
         own = [(sentence, {"count": self.skipped_count})] if self.skipped_count else []
         return own + self.kept.notes()
 

@@ -142,7 +142,7 @@ class VELLUS_MT_hair_pie(bpy.types.Menu):
         pie.operator("vellus.select_guides", icon="RESTRICT_SELECT_OFF")
         pie.operator_menu_enum("vellus.add_style", "style", icon="ADD")
         pie.operator("vellus.unfreeze_all")
-        pie.operator("vellus.toggle_drawing", icon="HIDE_OFF")
+        pie.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
 
 
 def _in_add_menu(menu, _context):

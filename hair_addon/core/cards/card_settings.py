@@ -62,7 +62,7 @@ class CardSettings(Settings):
     )
     flyaways: float = param(
         0.0,
-        "Part of the cards that show single strands, which stand out from their clump",
+        "Part of the cards that show one strand each, one of those that are farthest from the strands near them",
         label="Flyaways",
         low=0.0,
         high=0.9,

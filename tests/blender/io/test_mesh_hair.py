@@ -223,7 +223,7 @@ def test_the_command_line_grooms_from_a_mesh(sphere, cards, lines, tmp_path):
         np.testing.assert_allclose(arrays["strand_points"][:, -1], [line[-1] for line in lines], atol=1e-5)
     for more, sentence in [
         (("--from-mesh", "Nope"), 'no mesh object "Nope"'),
-        (("--from-mesh", "Cards", "--hair-from", path), "leave out"),
+        (("--from-mesh", "Cards", "--hair-from", path), "excludes"),
         (("--mesh-roots", "LOW_V"), "need --from-mesh"),
     ]:
         ended = run_here("groom", path, "--surface", "Sphere", *more, "--out", "//kept.npz")

@@ -174,7 +174,7 @@ class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_paint_density(HairOperator, bpy.types.Operator):
-    """Paint the density of strands on the surface with Blender's brushes; or stop painting"""
+    """Paint the density of strands on the surface with Blender's brushes, or stop painting"""
 
     bl_idname = "vellus.paint_density"
     bl_label = "Paint Density"
