@@ -9,8 +9,8 @@ import zlib
 import bpy
 import numpy as np
 
+from ....core import geometry
 from ....core.errors import HairError
-from ....core.geometry import fingerprint, strands
 from ...data import scene
 from ...data.strands import curves, frozen_points, gathered_groups
 from ...gpu import drawing, strand_textures
@@ -91,9 +91,9 @@ def _hues_texture(guides):
     if guides.vellus.guide_colors != "LENGTH":
         return None
     starts, points = curves.curve_offsets(guides), curves.read_points(guides)
-    source, known = (fingerprint.fingerprint(points), starts.tobytes()), hue_cache.get(guides.session_uid)
+    source, known = (geometry.fingerprint.fingerprint(points), starts.tobytes()), hue_cache.get(guides.session_uid)
     if known is None or known[0] != source:
-        hues = _hues_of_lengths(strands.ragged_lengths(points, starts))
+        hues = _hues_of_lengths(geometry.strands.ragged_lengths(points, starts))
         known = hue_cache.keep(guides.session_uid, (source, _numbers_texture(hues)))
     return known[1]
 

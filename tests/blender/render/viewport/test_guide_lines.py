@@ -11,6 +11,7 @@ from hair_addon.blender.data.strands import curves, frozen_points, gathered_grou
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import guide_lines
+from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.strands import ragged_lengths
 from tests.support.reading import write_points
 
@@ -129,7 +130,7 @@ def test_colors_of_lengths_are_computed_once_per_change(guides, monkeypatch):
     """A redraw that nothing changed computes no lengths; changed guides have new colors."""
     guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "LENGTH"
     measured, real = [], ragged_lengths
-    monkeypatch.setattr(guide_lines.strands, "ragged_lengths", lambda *given: measured.append(1) or real(*given))
+    monkeypatch.setattr(strands, "ragged_lengths", lambda *given: measured.append(1) or real(*given))
     points = curves.read_points(guides.data)
     before = read(guides)
     np.testing.assert_array_equal(read(guides), before)
