@@ -42,12 +42,27 @@ def test_animation_has_the_frames_of_the_scene(shot, ending):
     assert told["frames"] == 3
 
 
+def test_levels_of_detail_and_looks_are_variants_of_usd(shot):
+    options = ["--level-count", "2", "--looks", "Black, Dyed Blue"]
+    assert run_here("export", shot, "--out", "//variants.usdc", *options).status == 0
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(shot.parent / "variants.usdc"))
+    for group in ("Hair", "Fluff"):
+        sets = stage.GetPrimAtPath(f"/groom/{group}").GetVariantSets()
+        assert sets.GetVariantSet("lod").GetVariantNames() == ["full", "half"]
+        assert sets.GetVariantSet("look").GetVariantNames() == ["Black", "Dyed_Blue", "present"]
+
+
 @pytest.mark.parametrize(
     ("words", "reported"),
     [
         (["--out", "a.fbx"], "exported as .abc"),
         (["--out", "a.abc", "--hair", "Nobody"], 'has no hair "Nobody"'),
         (["--out", "a.abc", "--no-strands", "--no-guides"], "choose one"),
+        (["--out", "a.abc", "--level-count", "2"], "neither levels of detail"),
+        (["--out", "a.usdc", "--looks", "Black, Nothing"], 'no look "Nothing"'),
     ],
 )
 def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, reported):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...core.errors import HairError, cause_of
-from ...core.files import export_settings, settings_file
+from ...core.files import export_settings, groom_curves, settings_file
 from ...core.files.alembic import unreal_groom
 from ...core.files.atomic_file import atomic_file, require_writable_path
 from ...core.files.strands import writers
@@ -17,8 +17,9 @@ from ..groom.transfer import groom_settings
 from ..host import paths, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
+from ..settings import saved_looks
 from . import delivery, groom_sources, strand_arrays
-from .usd import hair_file, usd_groom
+from .usd import hair_file, usd_groom, usd_variants
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ def exporting(path, chosen, settings, blender_scene):
         sentence = "{path} can hold only one frame: choose Nothing in Animation, or write .abc or .usd."
         raise HairError(sentence, path=path)
     frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
+    variants = _variants(path, settings)
     simulated = _simulated(chosen, frames)
     per_meter = _per_meter(path)
     remembered = [Remembered(hair) for hair in chosen]
@@ -75,7 +77,7 @@ def exporting(path, chosen, settings, blender_scene):
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         if not _is_usd(path) and instances:
             sources += groom_sources.copies_of(sources, instances)
-        with atomic_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
+        with atomic_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene, variants) as writer:
             numbers = yield _adding(writer, sources, path)
             for name, matrix in instances if _is_usd(path) else ():
                 writer.add_instance(name, matrix)
@@ -111,15 +113,26 @@ def _go_to(blender_scene, time):
         delivery.go_to(blender_scene, time)
 
 
-def _opened(partial, path, chosen, first_frame, blender_scene):
+def _opened(partial, path, chosen, first_frame, blender_scene, variants):
     """Return the context of a writer; first_frame: None without animation."""
     if _is_strands(path):
         return writers.writing(partial, path.suffix.lower())
     header = f"Vellus {paths.addon_version()}", _properties(chosen)
     rate = scene_time.frame_rate(blender_scene)
     if _is_usd(path):
-        return usd_groom.writing(partial, path, *header, rate, first_frame or 0)
+        return usd_groom.writing(partial, path, *header, rate, first_frame or 0, variants)
     return unreal_groom.writing(partial, *header, None if first_frame is None else rate, first_frame or 0)
+
+
+def _variants(path, settings):
+    """Return the `Variants` of a file. Raises `HairError` for formats without variants and for unknown looks."""
+    names = list(dict.fromkeys(filter(None, (name.strip() for name in settings.looks.split(",")))))
+    if not _is_usd(path) and (settings.level_count > 1 or names):
+        sentence = "{path} can hold neither levels of detail nor further looks: write .usd, .usdc or .usda."
+        raise HairError(sentence, path=path)
+    looks = [saved_looks.named(name) for name in names]
+    variant_names = groom_curves.group_names(names, {usd_variants.PRESENT_LOOK})
+    return usd_variants.Variants(settings.level_count, dict(zip(variant_names, looks, strict=True)))
 
 
 def _simulated(chosen, frames):

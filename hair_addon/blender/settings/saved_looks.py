@@ -6,6 +6,7 @@ Unlike Blender's presets, which are Python scripts that it runs, a look contains
 
 from dataclasses import asdict
 
+from ...core.errors import HairError
 from ...core.files import settings_file
 from ...core.params import declared
 from ...core.shading import presets
@@ -20,6 +21,16 @@ names, change_time, remove = FILES.names, FILES.change_time, FILES.remove
 def all_names():
     """Names of the built-in looks, then of saved ones."""
     return [*presets.PRESETS, *names()]
+
+
+def named(name):
+    """Return the built-in or saved `Appearance` of a name, as in the menu. Raises `HairError`."""
+    for identifier, (label, look) in presets.PRESETS.items():
+        if name.casefold() in (identifier.casefold(), label.casefold()):
+            return look
+    if name in names():
+        return read(name)
+    raise HairError('There is no look "{name}": enter a name of the menu Looks.', name=name)
 
 
 def write(name, look):

@@ -25,6 +25,17 @@ class ExportSettings(Settings):
             ("ALL", "Guides and Hair", "Write guides and hair in every frame; files become large"),
         ),
     )
+    level_count: int = param(
+        1,
+        "Levels of detail in USD files, as variants; each has half the strands of the previous one, twice as thick",
+        label="Levels of detail",
+        low=1,
+        high=6,
+    )
+    looks: str = param(
+        "",
+        "Further looks in USD files, as variants: names of built-in or saved looks, separated by commas",
+    )
 
     def moves(self, is_guide: bool) -> bool:
         """Return whether the file animates the guides, or the strands if not `is_guide`."""
