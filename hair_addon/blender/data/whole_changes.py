@@ -257,13 +257,14 @@ def _state_of(owner):
 
 
 def _is_hidden(one):
-    """Whether an object is hidden by its eye in the view layer."""
-    return _is_in_layer(one) and one.hide_get()
+    """Whether an object is hidden by its eye in the view layer; False if it is in none."""
+    return bpy.context.view_layer is not None and one.hide_get()
 
 
 def _is_in_layer(one):
+    """Whether an object is in the view layer; compared one by one, as names may be unreadable."""
     layer = bpy.context.view_layer
-    return layer is not None and layer.objects.get(one.name) == one
+    return layer is not None and any(other == one for other in layer.objects)
 
 
 def _restore(owner, state):

@@ -27,7 +27,7 @@ OTHERS = {
     "blender/data/pictures/rendered_files.py": "Blender's images",
     "blender/io/curve_files.py": "a .blend",
     "blender/io/groom_files.py": "what was just written",
-    "core/files/gltf_springs.py": "what was just written",
+    "core/files/glb.py": "what was just written",
     "blender/io/groom_library.py": "a .blend, whose settings are read by settings_file.py",
     "blender/io/mesh_files.py": "a USD file that was opened",
     "blender/io/usd/usd_stage.py": "USD",
