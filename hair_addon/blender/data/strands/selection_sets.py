@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...host.notices import name_of
 from . import attributes, curves, guide_curves
 
 _PREFIX = "selection_"
@@ -10,11 +11,8 @@ _PREFIX = "selection_"
 
 def names(datablock):
     """Return the sorted names of the selection sets of guides."""
-    return sorted(
-        one.name.removeprefix(_PREFIX)
-        for one in datablock.attributes
-        if one.name.startswith(_PREFIX) and (one.data_type, one.domain) == ("BOOLEAN", "POINT")
-    )
+    found = [name_of(one) for one in datablock.attributes if (one.data_type, one.domain) == ("BOOLEAN", "POINT")]
+    return sorted(name.removeprefix(_PREFIX) for name in found if name.startswith(_PREFIX))
 
 
 def read(datablock, name):
