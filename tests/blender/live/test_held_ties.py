@@ -104,6 +104,30 @@ def test_hair_is_held_up_to_its_tie_after_it_is_cut(tied):
     np.testing.assert_array_equal(now[~is_behind], 1.0)
 
 
+def tie_places(guides):
+    """Return positions (G, 3) of ties in the world."""
+    placed = points(guides) @ np.array(guides.matrix_world)[:3, :3].T + np.array(guides.matrix_world.translation)
+    steps = np.linalg.norm(np.diff(points(guides), axis=1), axis=2)
+    along = np.insert(np.cumsum(steps, axis=1), 0, 0.0, axis=1)
+    held = gathered_groups.read(guides.data).held * along[:, -1]
+    return np.stack(
+        [[np.interp(*of, place) for place in line.T] for line, *of in zip(placed, held, along, strict=True)]
+    )
+
+
+@pytest.mark.parametrize("scale", [(1.0, 0.5, 3.0), (-1.0, 2.0, 1.0)])
+def test_ties_stay_in_place_when_an_uneven_scale_is_applied(tied, scale):
+    head = bpy.data.objects["Sphere"]
+    head.animation_data_clear()
+    head.scale = scale
+    bpy.context.view_layer.update()
+    before = tie_places(tied)
+    select(head)
+    bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    update()
+    np.testing.assert_allclose(tie_places(bpy.data.objects["Guides"]), before, atol=2e-3)
+
+
 @pytest.mark.parametrize("scale", [0.01, 3.0])
 def test_hair_is_held_up_to_its_tie_after_a_scale_is_applied(tied, scale):
     before, lengths = held_lengths(tied)

@@ -66,10 +66,31 @@ def write(datablock, gathered):
 
 
 def scale(datablock, change):
-    """Scale the stored lengths up to ties as an `Affine` of the local coordinates scales widths."""
+    """Change the stored lengths up to ties as an `Affine` has changed the local coordinates of guides.
+
+    Each segment is scaled as in its direction, and lengths beyond the tip as widths.
+    """
     lengths = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
-    if lengths is not None and len(lengths):
-        attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", change.widths(lengths))
+    if lengths is None or not len(lengths):
+        return
+    scaled = change.widths(lengths)
+    if change.scale > 0.0 and not change.preserves_widths:
+        points, starts = np.nan_to_num(curves.read_points(datablock)), curves.curve_offsets(datablock)
+        now, before = (_segment_lengths(one, starts) for one in (points, change.inverse.points(points)))
+        along = np.cumsum(before) - before
+        along -= np.repeat(along[starts[:-1]], np.diff(starts))
+        left = np.repeat(lengths.astype(np.float64), np.diff(starts)) - along
+        parts = np.clip(left / np.maximum(before, 1e-30), 0.0, 1.0)
+        beyond = np.maximum(lengths - np.add.reduceat(before, starts[:-1]), 0.0)
+        scaled = np.add.reduceat(parts * now, starts[:-1]) + change.widths(beyond)
+    attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", scaled)
+
+
+def _segment_lengths(points, starts):
+    """Return lengths (N,) float64 from each point to the next point of its guide, zero at tips."""
+    found = np.append(np.linalg.norm(np.diff(points.astype(np.float64), axis=0), axis=1), 0.0)
+    found[starts[1:] - 1] = 0.0
+    return found
 
 
 def _lengths(datablock):
