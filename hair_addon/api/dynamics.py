@@ -150,8 +150,9 @@ def simulate(
     settings: `DynamicsSettings`; changes: its fields by name; frame_rate: of the poses [1/s]; gravity: [m/s²]; regions:
     (G,) integers; no friction or pressure acts between guides of different regions, as across a parting; None for one
     region; held: (G,) from 0 to 1, the part of each guide's length, up to its tie, that only follows the mesh, such as
-    the attribute `gathered_held` of gathered guides; None for guides without ties. Raises `HairError` for invalid
-    arguments, and during iteration for a pose with another number of vertices or non-finite ones.
+    the attribute `gathered_held` of gathered guides, without effect if the settings' `holds_ties` is off; None for
+    guides without ties. Raises `HairError` for invalid arguments, and during iteration for a pose with another number
+    of vertices or non-finite ones.
 
     >>> import numpy as np
     >>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)

@@ -5,7 +5,7 @@ After an event nothing is drawn or computed from values that were cached before 
 """
 
 from ..data.maps import image_pixels
-from ..data.pictures import root_colors
+from ..data.pictures import root_colors, unread_nodes
 from ..gpu import world_texture
 from ..groom.guides import guide_states, outside_guides
 from ..render import hair_cache, modified_hair
@@ -13,8 +13,10 @@ from ..render.viewport import viewport
 
 
 def scene_changed(is_hair_only=False):
-    """Anything was changed, hidden or shown: viewports read their scenes again; is_hair_only: only hair changed."""
+    """Anything was changed, hidden or shown: views and panels read scenes again; is_hair_only: only hair changed."""
     viewport.invalidate(is_hair_only=is_hair_only)
+    if not is_hair_only:
+        unread_nodes.sentence_cache.clear()
 
 
 def curves_reported(datablock):

@@ -6,7 +6,7 @@
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.maps import image_pixels, sources
-from ..data.pictures import drawn_meshes, root_colors, world_panoramas
+from ..data.pictures import drawn_meshes, root_colors, unread_nodes, world_panoramas
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
@@ -61,6 +61,7 @@ COPIES = (
     moving_surfaces.moved_cache,
     moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,
+    unread_nodes.sentence_cache,
     image_pixels.pixel_cache,
     dynamics_state.map_status_cache,
 )

@@ -91,3 +91,24 @@ def test_panel_and_command_line_name_them(painted, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     ended = run_here("render", path, "--out", tmp_path / "a.png", "--dry-run")
     assert ended.status == 0 and '"Skin" (Noise Texture)' in ended.errors
+
+
+def test_a_panel_reads_nodes_again_only_after_a_change(painted, monkeypatch):
+    """A redraw without a change reads no nodes; a changed node, object or file is shown by the next redraw."""
+    material, shader = painted
+    read, real = [], unread_nodes.sentences
+    monkeypatch.setattr(unread_nodes, "sentences", lambda scene: read.append(scene) or real(scene))
+    bpy.context.scene.render.engine = NAME
+
+    def shown():
+        bpy.context.view_layer.update()
+        return [text for text in draw(bpy.types.VELLUS_PT_sampling).texts if "(Noise Texture)" in text]
+
+    assert shown() == shown() == [] and len(read) == 1
+    link(material.node_tree, "ShaderNodeTexNoise", shader.inputs["Base Color"])
+    assert len(shown()) == len(shown()) == 1 and len(read) == 2
+    bpy.context.object.hide_render = True
+    assert shown() == shown() == [] and len(read) == 3
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.render.engine = NAME
+    assert shown() == [] and len(read) == 4

@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Nodes of lights and of surfaces' materials that Vellus does not read, for sentences in panels and commands."""
 
+from ...host.caches import Cache
 from ...host.notices import name_of
 from . import surface_materials
 from .shader_sockets import ShaderInput
 
 _MOST = 3  # names in a sentence
+
+sentence_cache = Cache()  # session_uid of a scene → `sentences` of it
+
 _OF_LIGHTS = (
     "Nodes of lights have no effect in Vellus, except Color and Strength of an Emission node, as values: {names}."
 )
 _OF_MATERIALS = (
     "Nodes of materials have no effect on surfaces in Vellus, except a shader's values and image textures: {names}."
 )
+
+
+def shown_sentences(scene):
+    """Return `sentences` for a panel, which are found again only after something has changed."""
+    return sentence_cache.get(scene.session_uid, lambda: sentences(scene))
 
 
 def sentences(scene):

@@ -83,10 +83,16 @@ def _draw_work(layout, context, surface, settings):
     draw_work(layout, seconds, byte_count)
 
 
-class _OfGuides(HairTab):
+class _OfAnyGuides(HairTab):
     bl_parent_id = "VELLUS_PT_guides"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+
+class _OfGuides(_OfAnyGuides):
     @classmethod
     def poll(cls, context):
         guides = guides_of(context.object)
@@ -122,33 +128,21 @@ class VELLUS_PT_guides_placement(_OfGuides, bpy.types.Panel):
         setting_rows.placement_rows(_column(self.layout, context), guides_of(context.object).vellus.guides)
 
 
-class VELLUS_PT_guides_tools(HairTab, bpy.types.Panel):
+class VELLUS_PT_guides_tools(_OfAnyGuides, bpy.types.Panel):
     """Tools that change guides and keep their combing"""
 
     bl_label = "Guide Tools"
     bl_idname = "VELLUS_PT_guides_tools"
-    bl_parent_id = "VELLUS_PT_guides"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return guides_of(context.object) is not None
 
     def draw(self, context):
         menus.draw_guide_tools(self.layout.column(align=True))
 
 
-class VELLUS_PT_guides_frozen(HairTab, bpy.types.Panel):
+class VELLUS_PT_guides_frozen(_OfAnyGuides, bpy.types.Panel):
     """Guides that are not combed"""
 
     bl_label = "Freeze"
     bl_idname = "VELLUS_PT_guides_frozen"
-    bl_parent_id = "VELLUS_PT_guides"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return guides_of(context.object) is not None
 
     def draw(self, _context):
         column = self.layout.column(align=True)
@@ -157,17 +151,11 @@ class VELLUS_PT_guides_frozen(HairTab, bpy.types.Panel):
         column.operator("vellus.invert_frozen")
 
 
-class VELLUS_PT_guides_selections(HairTab, bpy.types.Panel):
+class VELLUS_PT_guides_selections(_OfAnyGuides, bpy.types.Panel):
     """Saved selections of guides"""
 
     bl_label = "Selections"
     bl_idname = "VELLUS_PT_guides_selections"
-    bl_parent_id = "VELLUS_PT_guides"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return guides_of(context.object) is not None
 
     def draw(self, context):
         self.layout.operator("vellus.save_selection", icon="ADD")

@@ -40,7 +40,7 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
             write(self.layout, context, sentence, "INFO")
         for sentence in world_panoramas.sentences():
             write(self.layout, context, sentence, "INFO")
-        for sentence, values in unread_nodes.sentences(context.scene):
+        for sentence, values in unread_nodes.shown_sentences(context.scene):
             write(self.layout, context, interface_text(sentence, **values), "INFO")
 
 
