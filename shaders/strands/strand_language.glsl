@@ -30,11 +30,16 @@ int kind;
 int seed;
 float base;  // its amount on this strand
 float keep_length;
+bool keeps_all_length;
 float at_root;
 float at_tip;
 float exponent;
 float from;
 bool is_flipped;
+bool has_profile;
+bool has_start;
+bool is_curved;
+bool has_flipped;
 float least;
 float slope;
 // The clump center of the strand, whose normal is the reference of the frames shared by all strands of a clump. A strand

@@ -78,11 +78,15 @@ void take_centre()
 
 void take_profile()
 {
-  at_root = number_at(AT_ROOT_NUMBER);
-  at_tip = number_at(AT_TIP_NUMBER);
-  exponent = number_at(EXPONENT_NUMBER);
-  is_flipped = number_at(IS_FLIPPED_NUMBER) != 0.0;
-  from = number_at(FROM_NUMBER);
+  at_root = varied_number_at(AT_ROOT_NUMBER);
+  at_tip = varied_number_at(AT_TIP_NUMBER);
+  exponent = varied_number_at(EXPONENT_NUMBER);
+  is_flipped = varied_number_at(IS_FLIPPED_NUMBER) != 0.0;
+  from = varied_number_at(FROM_NUMBER);
+  has_profile = at_root != at_tip;
+  has_start = from != 0.0;
+  is_curved = exponent != 1.0 || is_flipped;
+  has_flipped = is_flipped;
   least = 0.5 / float(POINTS - 1);
   slope = 1.0 / power(least, 1.0 - exponent);
 }
@@ -150,9 +154,10 @@ void main()
     row_now = styling.steps[index];
     kind = row_now.kind;
     seed = row_now.seed;
-    keep_length = number_at(KEEP_LENGTH_NUMBER);
+    keep_length = varied_number_at(KEEP_LENGTH_NUMBER);
+    keeps_all_length = keep_length == 1.0;
     // A_si = base · profile(x_i).
-    base = number_at(AMOUNT_NUMBER) * (1.0 - number_at(VARY_NUMBER) * random(VARY));
+    base = varied_number_at(AMOUNT_NUMBER) * (1.0 - varied_number_at(VARY_NUMBER) * random(VARY));
     if (row_now.mask >= 0) {
       base *= known_number(KNOWN_LEVELS + styling.level_count + row_now.mask);
     }

@@ -8,7 +8,7 @@ import numpy as np
 from bpy.types import Curves, Object
 
 from ...core.errors import HairError
-from ...core.interpolation.hair_binding import HairBinding
+from ...core.geometry.mesh import SurfacePoints
 from ...core.maps import combination, varied_settings
 from ...core.params import Param
 from ...core.styling import program
@@ -37,8 +37,8 @@ class VariedNumber:
     def number_map(self) -> NumberMap:
         """The values for strands."""
 
-        def values(binding: HairBinding, clumps: np.ndarray | None) -> np.ndarray:
-            masks = self.source.values(binding.roots, binding.identities[0], clumps)[:, 0]
+        def values(roots: SurfacePoints, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
+            masks = self.source.values(roots, identities, clumps)[:, 0]
             return combination.varied_number(self.value, masks, self.source.combination, self.details)
 
         return NumberMap(values, self.source.settings.kind in _OF_PLACES)

@@ -194,12 +194,12 @@ def style_rows(layout, item):
             column = layout.column()
             column.active = name != "target" or owner.direction == "OBJECT"
             search_row(column, owner, name, bpy.data, "objects")
-    rows(layout, owner, settings_class, others(StyleSettings, ("is_on", "amount"), _MASK))
+    rows(layout, owner, settings_class, others(StyleSettings, ("is_on", "amount"), _MASK), text_of(item, "name"))
 
 
 def profile_rows(layout, item):
     """Profile of a style's amount from root to tip."""
-    rows(layout, style_items.group_of(item), ProfiledSettings, _PROFILE)
+    rows(layout, style_items.group_of(item), KINDS[item.kind], _PROFILE, text_of(item, "name"))
 
 
 def style_mask_rows(layout, item, surface):

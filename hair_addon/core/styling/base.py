@@ -12,7 +12,7 @@ straight line replaces x^e: x^e starts vertically, so points would jump when the
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeVar
 
@@ -34,6 +34,7 @@ class StyleSettings(Settings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     mask: str = param(
@@ -47,29 +48,45 @@ class StyleSettings(Settings):
 class ProfiledSettings(StyleSettings):
     """A style whose amount changes from root to tip."""
 
-    root: float = param(0.0, "Part of the amount at the roots", label="At root", low=0.0, high=1.0, subtype="FACTOR")
-    tip: float = param(1.0, "Part of the amount at the tips", label="At tip", low=0.0, high=1.0, subtype="FACTOR")
+    root: float = param(
+        0.0,
+        "Part of the amount at the roots",
+        label="At root",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
+    )
+    tip: float = param(
+        1.0, "Part of the amount at the tips", label="At tip", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
+    )
     shape: float = param(
         0.5,
         "Course from root to tip; higher values move the change toward the tip",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     start: float = param(
-        0.0, "Part of the length that keeps the amount of the root", low=0.0, high=0.99, subtype="FACTOR"
+        0.0,
+        "Part of the length that keeps the amount of the root",
+        low=0.0,
+        high=0.99,
+        subtype="FACTOR",
+        may_vary=True,
     )
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The numbers of a profile, as read by kernels."""
+    """The numbers of a profile, as read by kernels; arrays (S,) if they differ between strands."""
 
-    root: float = 1.0
-    tip: float = 1.0
-    exponent: float = 1.0
-    is_flipped: bool = False  # whether the Shape is above one half
-    start: float = 0.0
+    root: Any = 1.0
+    tip: Any = 1.0
+    exponent: Any = 1.0
+    is_flipped: Any = False  # whether the Shape is above one half
+    start: Any = 0.0
 
 
 EVERYWHERE = Profile()
@@ -104,17 +121,18 @@ class Step:
     """A row of a program: one run of a .strand file.
 
     kind: a key of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
+    amount, keep_length, profile, numbers: with arrays (S,) in place of floats that differ between strands;
     level: level of the clump centers that the step needs, counted from its style's first; None for a style above;
     place, part: indices of its style in the stack, and of the step among the steps of this style.
     """
 
     kind: str
     settings: StyleSettings
-    amount: float
+    amount: Any
     profile: Profile
     numbers: Mapping[str, Any]  # floats, or tuples of floats for a name with a size
     level: int | None = None
-    keep_length: float = 1.0
+    keep_length: Any = 1.0
     place: int = 0
     part: int = 0
 
@@ -138,9 +156,16 @@ def profile_of(settings: StyleSettings) -> Profile:
     """Return the `Profile` of a style's settings; without profile settings, a constant one."""
     if not isinstance(settings, ProfiledSettings):
         return EVERYWHERE
-    shape = settings.shape
-    exponent = -math.log2(1.0 - min(shape, 1.0 - shape))
-    return Profile(settings.root, settings.tip, exponent, shape > 0.5, settings.start)
+    exponent = of_each(lambda shape: -math.log2(1.0 - min(shape, 1.0 - shape)), settings.shape)
+    return Profile(settings.root, settings.tip, exponent, settings.shape > 0.5, settings.start)
+
+
+def of_each(function: Callable[[float], float], values: Any) -> Any:
+    """Return a function of a float, or (S,) of each number of an array, with the bits of the float's."""
+    if not isinstance(values, np.ndarray):
+        return function(values)
+    distinct, places = np.unique(values, return_inverse=True)
+    return np.array([function(each) for each in distinct.tolist()])[places]
 
 
 def step_of(settings: StyleSettings, kind: str, numbers: Mapping[str, Any], **changes: Any) -> Step:

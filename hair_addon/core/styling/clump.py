@@ -14,6 +14,9 @@ in clump_trees.py.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..params import param, param_of
 from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
@@ -66,6 +69,7 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=10.0,
         soft_high=2.0,
+        may_vary=True,
     )
     thickness: float = param(
         0.12,
@@ -102,10 +106,13 @@ def sizes(settings: Settings) -> list[float]:
     return [settings.size * settings.ratio**level for level in range(settings.levels)]
 
 
-def amounts(settings: Settings) -> list[float]:
-    """Return the strength of each level's locks, the largest first. All are zero if the amount is zero."""
+def amounts(settings: Settings) -> list[Any]:
+    """Return the strength of each level's locks, the largest first. All are zero if the amount is zero.
+
+    Arrays (S,) if the settings differ between strands.
+    """
     parts = [level / max(settings.levels - 1, 1) for level in range(settings.levels)]
-    return [min(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]
+    return [np.minimum(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]
 
 
 def packed_thickness(strand_density: float, radius: float) -> float:

@@ -122,6 +122,7 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     root: float = param_of(ProfiledSettings, "root", 0.4)
     shape: float = param_of(ProfiledSettings, "shape", 0.4)

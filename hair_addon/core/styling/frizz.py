@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..params import param
-from .base import Cutter, ProfiledSettings, Step, step_of
+from .base import Cutter, ProfiledSettings, Step, of_each, step_of
 
 LABEL = "Frizz"
 DESCRIPTION = "Ruffle strands by smooth noise"
@@ -72,6 +72,7 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
     coherence: float = param(
         0.0,
@@ -102,14 +103,13 @@ class Settings(ProfiledSettings):
         low=0.0,
         high=1.0,
         subtype="FACTOR",
+        may_vary=True,
     )
 
 
 def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
     """Return the steps that ruffle strands."""
-    gains = settings.gain ** np.arange(settings.octaves)
-    # Each coordinate of ρ has the amplitude as its root mean square: the square of a wave is one half.
-    per_size = (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5
+    per_size = of_each(lambda gain: _per_size(gain, settings.octaves), settings.gain)
     wave = np.arange(WAVES_AN_OCTAVE)
     numbers = {
         "amplitude": settings.amplitude * per_size,
@@ -123,3 +123,9 @@ def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
         "frequencies": tuple(2.0 ** ((wave + 0.5) / WAVES_AN_OCTAVE - 0.5)),
     }
     return [step_of(settings, STEP, numbers, keep_length=settings.keep_length)]
+
+
+def _per_size(gain, octaves):
+    """Return the factor with which each coordinate of ρ has the amplitude as its root mean square."""
+    gains = gain ** np.arange(octaves)
+    return (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5  # the square of a wave is one half

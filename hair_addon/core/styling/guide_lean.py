@@ -30,11 +30,12 @@ def _lean(
     points: wp.array2d[wp.vec3],
     amounts: wp.array2d[float],
     directions: wp.array[wp.vec3],
-    clearance: float,
+    clearances: wp.array[float],
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
     guide = wp.tid()
+    clearance = clearances[guide]
     corners = wp.mesh_get(surface).points
     indices = wp.mesh_get(surface).indices
     position = points[guide, 0]
@@ -94,27 +95,32 @@ def leaned(
     directions: np.ndarray,
     surface: SurfaceQuery,
     vertex_normals: np.ndarray,
-    clearance: float,
+    clearances: np.ndarray,
 ) -> np.ndarray:
     """Return (G, P, 3) float32 [m]: guides whose segments are rotated toward directions.
 
     points: (G, P, 3) [m]; amounts: (G, P) in [0, 1]; directions: (G, 3) unit; surface: for the clearance;
-    vertex_normals: (V, 3) of its mesh; clearance [m]. A guide whose amounts are all zero keeps its bits.
+    vertex_normals: (V, 3) of its mesh; clearances: (G,) [m]. A guide whose amounts are all zero keeps its bits.
     """
     require_count("amounts", len(amounts), len(points))
     require_count("directions", len(directions), len(points))
+    require_count("clearances", len(clearances), len(points))
     require_count("points", amounts.shape[1], points.shape[1])
     require_count("normals", len(vertex_normals), len(surface.mesh.points))
     if not (np.isfinite(points).all() and np.isfinite(directions).all()):
         raise HairError("Guides with non-finite coordinates cannot lean.")
     device = surface.mesh.device
-    there = [
-        wp.array(np.ascontiguousarray(array, np.float32), dtype=kind, device=device)
-        for array, kind in ((vertex_normals, wp.vec3), (points, wp.vec3), (amounts, float), (directions, wp.vec3))
-    ]
+    columns = (
+        (vertex_normals, wp.vec3),
+        (points, wp.vec3),
+        (amounts, float),
+        (directions, wp.vec3),
+        (clearances, float),
+    )
+    there = [wp.array(np.ascontiguousarray(array, np.float32), dtype=kind, device=device) for array, kind in columns]
     made = wp.empty(points.shape[:2], dtype=wp.vec3, device=device)
     normals, *rows = there
-    inputs = [surface.mesh.id, normals, *map(parallel.Rows, rows), clearance]
+    inputs = [surface.mesh.id, normals, *map(parallel.Rows, rows)]
     parallel.launch(_lean, len(points), inputs, [made], device, least_rows=_LEAST_ROWS)
     result = made.numpy()
     is_still = ~(amounts > 0.0).any(axis=1)

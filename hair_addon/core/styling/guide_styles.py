@@ -5,9 +5,10 @@ Combed guides themselves do not change. Only guides that changed are computed ag
 the guides that it moves.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,10 @@ from .. import geometry, styling
 from ..geometry.mesh import SurfacePoints, TriMesh, normals
 from ..geometry.strands import Strands, from_numpy
 from ..geometry.strands import segment_lengths as lengths_of
-from . import base, lean, wet
+from . import base, kinds, lean, wet
 from .base import Profile, StyleSettings, has_effect
 from .random_numbers import VARY, random_numbers
+from .varied_numbers import NumberMap
 
 _WET_ROOT = 0.3  # fraction of the length over which wet hair starts to lean
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -28,19 +30,34 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Lean:
     """One style on guides.
 
-    settings: of the style; amounts (G,): of each guide; course(x): profile; directions (G, 3): unit; clearance [m].
+    settings: of the style; amounts (G,): of each guide; profiles: a `Profile` of all guides, or one of each; None for
+    the course of wet hair; directions (G, 3): unit; clearances (G,) [m].
     """
 
     settings: StyleSettings
     amounts: np.ndarray
-    course: Callable[[np.ndarray], np.ndarray]
+    profiles: Sequence[Profile] | None
     directions: np.ndarray
-    clearance: float
+    clearances: np.ndarray
 
     def is_same(self, other: "Lean") -> bool:
         """Return whether both styles lean guides equally."""
-        arrays = (self.amounts, other.amounts), (self.directions, other.directions)
-        return self.settings == other.settings and all(np.array_equal(*pair) for pair in arrays)
+        is_same = self.settings == other.settings and self.profiles == other.profiles
+        arrays = (
+            (self.amounts, other.amounts),
+            (self.directions, other.directions),
+            (self.clearances, other.clearances),
+        )
+        return is_same and all(np.array_equal(*pair) for pair in arrays)
+
+    def course(self, chosen: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Return the part of the amount (M, P) of guides with indices chosen (M,) at x (M, P), as of `evaluated`."""
+        if self.profiles is None:
+            return np.clip(x / _WET_ROOT, 0.0, 1.0)
+        if len(self.profiles) == 1:
+            return base.evaluated(self.profiles[0], x)
+        rows = [base.evaluated(self.profiles[guide], its_x) for guide, its_x in zip(chosen, x, strict=True)]
+        return np.array(rows).reshape(x.shape)
 
 
 def leans(
@@ -51,28 +68,47 @@ def leans(
     masks: dict[Any, np.ndarray],
     targets: dict[str, np.ndarray],
     mask_key: Callable[[StyleSettings], Any],
+    numbers: Mapping[tuple[int, str], NumberMap] = MappingProxyType({}),
 ) -> list[Lean]:
     """Return the `Lean` of each style that acts on guides, in order.
 
     roots: of the guides; identities: (G,) int32 IDs; masks: (G,) weights by their keys; targets: unit (3,) directions
-    by objects' names.
+    by objects' names; numbers: that differ between guides, by (index of the style, name of the setting).
     """
     found = []
-    for settings in filter(has_effect, styles):
-        if not isinstance(settings, lean.Settings | wet.Settings):
+    for place, declared in enumerate(styles):
+        if not isinstance(declared, lean.Settings | wet.Settings) or not has_effect(declared):
             continue
-        amounts = settings.amount * (1.0 - settings.vary * random_numbers(identities, settings.seed, VARY))
+        values = {name: each.of_guides(roots, identities) for (its, name), each in numbers.items() if its == place}
+        settings = kinds.with_values(declared, values)
+        amounts = settings.amount * (1.0 - np.float32(settings.vary) * random_numbers(identities, settings.seed, VARY))
         key = mask_key(settings)
         amounts = amounts if key is None else amounts * masks[key]
         if isinstance(settings, wet.Settings):
             directions = np.tile(DOWN, (len(roots), 1))
-            clearance = settings.lock * wet.CLEARANCE
-            found.append(Lean(settings, amounts * settings.cling, _wet_course, directions, clearance))
+            clearances = _of_all(settings.lock * wet.CLEARANCE, len(roots))
+            found.append(Lean(declared, amounts * np.float32(settings.cling), None, directions, clearances))
             continue
         directions = _directions(settings, mesh, roots, targets)
         if directions is not None:
-            found.append(Lean(settings, amounts, _course(base.profile_of(settings)), directions, settings.clearance))
+            clearances = _of_all(settings.clearance, len(roots))
+            found.append(Lean(declared, amounts, _profiles(settings, len(roots)), directions, clearances))
     return found
+
+
+def _of_all(value, count):
+    """Return (G,) float32 of a number of guides, or of an array (G,)."""
+    return np.broadcast_to(np.asarray(value, np.float32), count)
+
+
+def _profiles(settings, count):
+    """Return the `Profile` of all guides, or one of each if its numbers differ between guides."""
+    profile = base.profile_of(settings)
+    numbers = [getattr(profile, field.name) for field in fields(profile)]
+    if not any(isinstance(number, np.ndarray) for number in numbers):
+        return [profile]
+    rows = zip(*(np.broadcast_to(number, count).tolist() for number in numbers), strict=True)
+    return [Profile(*row) for row in rows]
 
 
 def _directions(settings, mesh, roots, targets):
@@ -82,14 +118,6 @@ def _directions(settings, mesh, roots, targets):
         return np.tile(DOWN, (len(roots), 1))
     target = targets.get(settings.target)
     return None if target is None else np.tile(target, (len(roots), 1))
-
-
-def _wet_course(x):
-    return np.clip(x / _WET_ROOT, 0.0, 1.0)
-
-
-def _course(profile: Profile):
-    return lambda x: base.evaluated(profile, x)
 
 
 class FollowedGuides:
@@ -141,8 +169,13 @@ class FollowedGuides:
         for style in self._leans:
             x = np.cumsum(lengths_of(points), axis=1)
             x = np.concatenate([np.zeros((count, 1)), x / np.maximum(x[:, -1:], 1e-20)], axis=1)
-            amounts = style.amounts[chosen][:, None] * style.course(x)
+            amounts = style.amounts[chosen][:, None] * style.course(chosen, x)
             points = styling.guide_lean.leaned(
-                points, amounts, style.directions[chosen], self._surface, self._mesh.vertex_normals, style.clearance
+                points,
+                amounts,
+                style.directions[chosen],
+                self._surface,
+                self._mesh.vertex_normals,
+                style.clearances[chosen],
             )
         return points

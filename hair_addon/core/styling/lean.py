@@ -36,6 +36,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         precision=4,
+        may_vary=True,
     )
     root: float = param_of(ProfiledSettings, "root", 0.0)
 

@@ -106,18 +106,22 @@ def compiled(
         level = guides_level if step.level is None else step.level
         mask = -1 if key is None else masks.index(key)
         places = varied[row] if varied else ()
-        bits = sum(1 << len(SHARED) + place for place in places)
+        bits = sum(1 << place for place in places)
         head = kinds.STEP_KINDS[step.kind], step.settings.seed, mask, level, first_centres[level]
         choices[row] = *head, bits, first_varied
         first_varied += len(places)
-        shared = (step.amount, step.settings.vary, *_numbers_of(step.profile), step.keep_length)
-        row_numbers = (*shared, *style_text.ordered(step))
+        row_numbers = numbers_of(step)
         numbers[row, : len(row_numbers)] = row_numbers
     return Program(choices, numbers)
 
 
-def _numbers_of(profile):
-    return profile.root, profile.tip, profile.exponent, float(profile.is_flipped), profile.start
+def numbers_of(step: Step) -> list[Any]:
+    """Return a step's numbers, the `SHARED` ones first, in the order in which kernels read them; arrays if they differ
+    between strands.
+    """
+    profile = step.profile
+    along = profile.root, profile.tip, profile.exponent, 1.0 * profile.is_flipped, profile.start
+    return [step.amount, step.settings.vary, *along, step.keep_length, *style_text.ordered(step)]
 
 
 def radius_factor(styles: Sequence[StyleSettings]) -> float:

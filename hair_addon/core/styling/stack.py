@@ -272,7 +272,14 @@ def bind(
         trees.keep_only({tree for tree, _level in levels})
     of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
     leaning = leans(
-        styles, trees.binder.mesh, guides.roots, guide_identities, of_guides, dict(inputs.targets), mask_key
+        styles,
+        trees.binder.mesh,
+        guides.roots,
+        guide_identities,
+        of_guides,
+        dict(inputs.targets),
+        mask_key,
+        inputs.numbers,
     )
     return Styling(
         tuple(styles),

@@ -58,6 +58,11 @@ const auto swap = [](auto*& a, auto*& b) {
   a = b;
   b = kept;
 };
+#if defined(__CUDA_ARCH__)
+const auto bit_count_of = [](int bits) { return __popc(bits); };
+#else
+const auto bit_count_of = [](int bits) { return __builtin_popcount(bits); };
+#endif
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
 
@@ -98,12 +103,23 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const float* number = numbers.data + size_t(step) * NUMBERS;
   const int kind = choice[0], seed = choice[1], mask = choice[2], level = choice[3], first_centre = choice[4];
   const int varied = choice[5], first_varied = choice[6];
-  const float keep_length = number[KEEP_LENGTH_NUMBER];
+  // A number that may differ between strands: a row of `masks` for each bit of `varied`, from `first_varied` on.
+  const auto varied_number_at = [&](int place) ALWAYS_INLINE {
+    lanes found = number[place];
+    if (((varied >> place) & 1) != 0) {
+      const int row = first_varied + bit_count_of(varied & ((1 << place) - 1));
+      const float* const values = masks.data + size_t(row) * masks.shape[1];
+      for (int lane = 0; lane < LANES; ++lane) set_lane(found, lane, values[strand[lane]]);
+    }
+    return found;
+  };
+  const lanes keep_length = varied_number_at(KEEP_LENGTH_NUMBER);
+  const bool keeps_all_length = !any_of(keep_length != 1.0f);
 
   // A_si = base · profile(x_i).
-  lanes base = number[AMOUNT_NUMBER];
-  const float vary = number[VARY_NUMBER];
-  if (vary != 0.0f) base *= 1.0f - vary * random_number(identity, seed, ints(VARY));
+  lanes base = varied_number_at(AMOUNT_NUMBER);
+  const lanes vary = varied_number_at(VARY_NUMBER);
+  if (any_of(vary != 0.0f)) base *= 1.0f - vary * random_number(identity, seed, ints(VARY));
   if (mask >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
@@ -141,10 +157,12 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       kept_length[i] = length[i];
     }
   }
-  const float at_root = number[AT_ROOT_NUMBER], at_tip = number[AT_TIP_NUMBER];
-  const float exponent = number[EXPONENT_NUMBER], from = number[FROM_NUMBER];
-  const bool is_flipped = number[IS_FLIPPED_NUMBER] != 0.0f;
-  const lanes least = 0.5f / (point_count - 1), slope = 1.0f / power(least, lanes(1.0f - exponent));
+  const lanes at_root = varied_number_at(AT_ROOT_NUMBER), at_tip = varied_number_at(AT_TIP_NUMBER);
+  const lanes exponent = varied_number_at(EXPONENT_NUMBER), from = varied_number_at(FROM_NUMBER);
+  const flags is_flipped = varied_number_at(IS_FLIPPED_NUMBER) != 0.0f;
+  const bool has_profile = any_of(at_root != at_tip), has_start = any_of(from != 0.0f);
+  const bool is_curved = any_of(exponent != 1.0f || is_flipped), has_flipped = any_of(is_flipped);
+  const lanes least = 0.5f / (point_count - 1), slope = 1.0f / power(least, 1.0f - exponent);
   const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
 
 #include "strand_language.h"

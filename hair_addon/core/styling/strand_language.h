@@ -12,21 +12,6 @@
 const vector zero_vector = {};
 const auto vector_of = [](lanes x, lanes y, lanes z) { return vector{x, y, z}; };
 const auto number_at = [&](int place) { return number[place]; };
-#if defined(__CUDA_ARCH__)
-const auto bit_count_of = [](int bits) { return __popc(bits); };
-#else
-const auto bit_count_of = [](int bits) { return __builtin_popcount(bits); };
-#endif
-// A number that may differ between strands: a row of `masks` for each bit of `varied`, from `first_varied` on.
-const auto varied_number_at = [&](int place) ALWAYS_INLINE {
-  lanes found = number[place];
-  if (((varied >> place) & 1) != 0) {
-    const int row = first_varied + bit_count_of(varied & ((1 << place) - 1));
-    const float* const values = masks.data + size_t(row) * masks.shape[1];
-    for (int lane = 0; lane < LANES; ++lane) set_lane(found, lane, values[strand[lane]]);
-  }
-  return found;
-};
 // Sine and cosine of an angle in turns: by a GPU's own instructions, error 4e-7, or by polynomials.
 const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) ALWAYS_INLINE {
 #if defined(__CUDA_ARCH__)
@@ -47,7 +32,7 @@ const auto length_at = [&](int i) { return length[i]; };
 const auto set_direction = [&](int i, const vector& direction) { t[i] = direction; };
 const auto set_length = [&](int i, lanes size) { length[i] = size; };
 // The next lengths of segments, for styles that change them.
-const bool changes_lengths = ((CHANGING_LENGTHS >> kind) & 1) != 0 || keep_length != 1.0f;
+const bool changes_lengths = ((CHANGING_LENGTHS >> kind) & 1) != 0 || !keeps_all_length;
 const auto next_direction_at = [&](int i) -> const vector& { return next[i]; };
 const auto next_length_at = [&](int i) { return next_length[i]; };
 const auto set_next = [&](int i, const vector& direction, lanes size) {

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
-from . import kinds, style_text
+from . import kinds, program
 from .base import Cutter, Step
 
 
@@ -19,12 +20,12 @@ from .base import Cutter, Step
 class NumberMap:
     """Values of a setting of a style for strands.
 
-    read: a function of a `HairBinding` and the clumps (S,) int32 of its strands, None if unknown, that returns (S,)
-    float64 in the setting's unit and range; is_of_places: whether values belong to places of the surface, so that the
-    strands of a lock take that of the lock's center.
+    read: a function of roots (S,), IDs (S,) int32 and the clumps (S,) int32 of strands, None if unknown, that returns
+    (S,) float64 in the setting's unit and range; is_of_places: whether values belong to places of the surface, so that
+    the strands of a lock take that of the lock's center.
     """
 
-    read: Callable[[HairBinding, np.ndarray | None], np.ndarray]
+    read: Callable[[SurfacePoints, np.ndarray, np.ndarray | None], np.ndarray]
     is_of_places: bool = True
 
     def of_strands(
@@ -35,11 +36,15 @@ class NumberMap:
         clumps: (S,) int32, None if unknown; locks: binding of the centers that strands share numbers of, and (S,) the
         center of each strand, -1 for none; None for a step without locks.
         """
-        own = self.read(binding, clumps)
+        own = self.read(binding.roots, binding.identities[0], clumps)
         if locks is None or not self.is_of_places or not len(locks[0].roots):
             return own
         of_centres, members = locks
-        return np.where(members >= 0, self.read(of_centres, None)[members], own)
+        return np.where(members >= 0, self.read(of_centres.roots, of_centres.identities[0], None)[members], own)
+
+    def of_guides(self, roots: SurfacePoints, identities: np.ndarray) -> np.ndarray:
+        """Return (G,) float64 of guides with roots and IDs (G,) int32."""
+        return self.read(roots, identities, None)
 
 
 def places_of(steps: Sequence[Step], numbers: Mapping[tuple[int, str], NumberMap]) -> list[tuple[int, ...]]:
@@ -79,4 +84,4 @@ def _names_of_style(step, numbers):
 def _ordered(step, values, cutters):
     if not values:
         return []
-    return style_text.ordered(kinds.steps_of(kinds.with_values(step.settings, values), cutters)[step.part])
+    return program.numbers_of(kinds.steps_of(kinds.with_values(step.settings, values), cutters)[step.part])

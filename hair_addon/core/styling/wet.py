@@ -10,7 +10,7 @@ strand if a mask or a variation makes w differ (strand_wetness.py).
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..params import param
+from ..params import param, param_of
 from . import clump, smooth
 from .base import EVERYWHERE, Cutter, Profile, Step, StyleSettings, TreeSettings, profile_of, step_of
 
@@ -41,8 +41,13 @@ class Settings(StyleSettings):
         subtype="DISTANCE",
         is_structural=True,
     )
-    cling: float = param(0.35, "How far wet hair leans down at its roots", low=0.0, high=1.0, subtype="FACTOR")
-    relax: float = param(0.8, "How far water straightens curls and waves", low=0.0, high=1.0, subtype="FACTOR")
+    cling: float = param(
+        0.35, "How far wet hair leans down at its roots", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
+    )
+    relax: float = param(
+        0.8, "How far water straightens curls and waves", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
+    )
+    vary: float = param_of(StyleSettings, "vary", may_vary=False)  # of the shading too
     swelling: float = param(0.15, "Increase of the radius of a soaked strand", low=0.0, high=1.0, subtype="FACTOR")
 
 

@@ -100,7 +100,9 @@ def test_a_guide_without_amount_keeps_its_bits(fur):
     amounts[::2] = 0.0
     directions_down = np.tile(DOWN, (len(points), 1))
     surface = SurfaceQuery(fur.mesh)
-    made = guide_lean.leaned(points, amounts, directions_down, surface, fur.mesh.vertex_normals, 0.004)
+    made = guide_lean.leaned(
+        points, amounts, directions_down, surface, fur.mesh.vertex_normals, np.full(len(points), 0.004)
+    )
     np.testing.assert_array_equal(made[::2], points[::2])
     assert np.abs(made[1::2] - points[1::2]).max() > 0.01
 

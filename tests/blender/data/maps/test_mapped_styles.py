@@ -146,3 +146,21 @@ def test_drawn_strands_are_written_as_they_are_drawn(curls, window):  # noqa: F8
         np.testing.assert_allclose(shown, bindings.of(curls).points, atol=2e-5)
     live_hair.write_all()
     np.testing.assert_array_equal(points(curls), bindings.of(curls).points)
+
+
+def test_guides_lean_by_their_own_values(hair):
+    """A map of a number of *Lean* gives the guides of each half the numbers of hair with this value everywhere."""
+    name, _surface = half_group()
+    api.add_style(hair.data, "LEAN", amount=0.6)
+    api.set_map(hair.data, "styles.Lean.tip", "strand", low=1.0, high=1.0)
+    whole = points(hair.data)
+    api.clear_map(hair.data, "styles.Lean.tip")
+    np.testing.assert_array_equal(points(hair.data), whole)
+    hair.data.vellus.styles[0].lean.tip = 0.25
+    weak = points(hair.data)
+    hair.data.vellus.styles[0].lean.tip = 1.0
+    api.set_map(hair.data, "styles.Lean.tip", f"group:{name}", low=0.25, high=1.0)
+    found = points(hair.data)
+    is_weak, is_whole = ((found == other).all(axis=(1, 2)) for other in (weak, whole))
+    assert min(is_weak.sum(), is_whole.sum()) > 0.2 * len(found)
+    assert not (is_weak & is_whole).any()

@@ -109,16 +109,32 @@ VARIED = {
     "clump": (clump.Settings(size=0.04), (), {"thickness": (0.1, 0.6), "twist": (0.0, 1.0), "stray": (0.0, 0.4)}),
     "hands of curls": (curl.Settings(radius=0.01), (), {"left_handed": (0.0, 0.9), "switchback": (0.0, 0.04)}),
     "coherent frizz": (frizz.Settings(amplitude=0.006), (), {"coherence": (0.0, 0.7), "stray": (0.0, 0.4)}),
+    "profile": (
+        curl.Settings(radius=0.01),
+        (),
+        {"root": (0.4, 0.0), "tip": (1.0, 0.3), "shape": (0.3, 0.8), "start": (0.0, 0.3), "keep_length": (1.0, 0.2)},
+    ),
+    "octaves": (frizz.Settings(amplitude=0.006, octaves=3), (), {"gain": (0.5, 0.9), "vary": (0.0, 0.8)}),
 }
 
 
-def varied(pair):
-    """Return the `NumberMap` of a value in each half of the head."""
-    return NumberMap(lambda binding, _clumps: np.where(binding.positions.numpy()[:, 0] > 0.0, pair[1], pair[0]))
+@pytest.fixture
+def varied(hair):
+    """Return a function: the `NumberMap` of a value in each half of the head."""
+    corners = hair.mesh.vertices[hair.mesh.triangles][..., 0]
+
+    def made(pair):
+        return NumberMap(
+            lambda roots, _identities, _clumps: np.where(
+                (corners[roots.triangle] * roots.barycentric).sum(axis=1) > 0.0, pair[1], pair[0]
+            )
+        )
+
+    return made
 
 
 @pytest.mark.parametrize("name", VARIED)
-def test_numbers_that_differ_between_strands_are_those_of_warp(hair, rng, one_program, name):
+def test_numbers_that_differ_between_strands_are_those_of_warp(hair, rng, one_program, varied, name):
     style, above, values = VARIED[name]
     numbers = {(len(above), setting): varied(pair) for setting, pair in values.items()}
     wanted = assert_same(hair, rng, (*above, style), inputs=Inputs(numbers=numbers))[2]
