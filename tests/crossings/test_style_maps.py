@@ -10,7 +10,8 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.groom import bindings, changed_weights
+from hair_addon.blender.data.maps import strand_maps
+from hair_addon.blender.groom import bindings, changed_weights, strand_thickness
 from tests.support.commands import load, run_here
 from tests.support.exchange.imported import select
 from tests.support.overridden import override, parts
@@ -274,3 +275,30 @@ def test_guides_on_another_surface(curls):
     require_halves(points(curls), low, high)
     half_group(bpy.data.objects["Sphere"], axis=1)
     require_halves(points(curls), low, high, axis=1)
+
+
+def test_painting_where_guides_are_on_another_surface(curls):
+    """Masks of densities and styles, and maps of looks and styles, are painted and read on the guides' surface."""
+    sphere, other = bpy.data.objects["Sphere"], bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
+    bpy.context.collection.objects.link(other)
+    curls.data.surface = other
+    update()
+    layer = bpy.context.view_layer.objects
+    for start, stop in (
+        (bpy.ops.vellus.paint_density, bpy.ops.vellus.paint_density),
+        (bpy.ops.vellus.paint_style_mask, bpy.ops.vellus.paint_style_mask),
+    ):
+        layer.active = curls
+        start()
+        assert (layer.active, sphere.mode) == (sphere, "WEIGHT_PAINT")
+        stop()
+        assert (layer.active, sphere.mode) == (curls, "OBJECT")
+    names = curls.data.vellus.hair.density_group, curls.data.vellus.styles[0].curl.mask
+    assert all(name in sphere.vertex_groups for name in names) and not other.vertex_groups
+    curls.data.vellus.styles[0].curl.mask = ""
+    api.set_map(curls.data, "look.melanin", "group:half")
+    update()
+    written = strand_maps.looks_of(curls.data)[0]
+    bound = strand_maps.looks_of(curls.data, strand_thickness.strands_of(curls.data, bindings.of(curls.data)))[0]
+    np.testing.assert_array_equal(written.root, bound.root)
+    assert np.ptp(written.root[:, 0]) > 0.1

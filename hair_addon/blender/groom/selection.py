@@ -6,6 +6,7 @@ from itertools import repeat
 import bpy
 from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
 
+from ..data.strands import curves
 from ..data.strands.curves import followers
 from ..data.usable_surfaces import is_deleted
 from ..host.notices import name_of, text_of
@@ -87,7 +88,7 @@ def painted_hair(active: Object) -> Curves | None:
     if not any(painted):
         return None
     for masks_of in (_active_masks, _style_masks, _map_sources, _density_masks):
-        masked = [hair for hair in curves_on(active, "HAIR") if any(map(_are_alike, masks_of(hair), repeat(painted)))]
+        masked = [hair for hair in grown_on(active) if any(map(_are_alike, masks_of(hair), repeat(painted)))]
         if masked:
             return _newest(masked)
     return None
@@ -140,6 +141,12 @@ def curves_on(surface: Object, kind: str) -> list[Curves]:
     if kind == "HAIR":
         return [hair for hair in found if is_shown(hair)]
     return [guides for guides in found if has_object(guides) or followers_shown(guides)]
+
+
+def grown_on(surface: Object) -> list[Curves]:
+    """Return all hair Curves that grow on a mesh object except deleted ones; their guides may be there alone."""
+    found = [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and curves.grown_on(c) == surface]
+    return [hair for hair in found if is_shown(hair)]
 
 
 def parts_of(active: Object | None) -> list[Curves]:

@@ -2,6 +2,7 @@
 """Rows of a map: its kind, the picker of this kind, and how it changes its setting; the curve of the thickness."""
 
 from ...core.maps import varied_settings
+from ..data.strands import curves
 from ..groom.styles import painted_maps
 from ..settings import map_items, ramp_nodes
 
@@ -21,7 +22,7 @@ def draw(layout, item, hair):
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(item, "kind")
-    surface = hair.surface
+    surface = curves.grown_on(hair)
     if item.kind == "IMAGE":
         layout.template_ID(item, "image", new="image.new", open="image.open")
         if surface is not None:

@@ -42,13 +42,14 @@ class Strands:
 def stored_strands(hair):
     """Return the `Strands` of hair Curves as they are stored. Raises `HairError`."""
     surface, roots = None, None
-    if hair.surface is not None:
-        surface = scene.read_surface(hair.surface, scene.last_depsgraph())
+    surface_object = curves.grown_on(hair)
+    if surface_object is not None:
+        surface = scene.read_surface(surface_object, scene.last_depsgraph())
         roots = stored_roots.points(hair, surface)
     identities = attributes.read(hair, "id", "INT", "CURVE")
     return Strands(
         hair,
-        hair.surface,
+        surface_object,
         surface,
         roots,
         np.arange(len(hair.curves), dtype=np.int32) if identities is None else identities,

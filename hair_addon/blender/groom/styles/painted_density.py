@@ -20,7 +20,7 @@ def paint(hair: Curves, context: Context) -> None:
     `HairError` before anything changes.
     """
     curves.require_editable(hair)
-    surface, settings = hair.surface, hair.vellus.hair
+    surface, settings = curves.grown_on(hair), hair.vellus.hair
     painted_masks.require_paintable(surface, context)
     if curves.is_hand_made(hair):
         raise HairError('"{name}" is kept unchanged: regenerate the strands first.', name=name_of(hair))
@@ -56,7 +56,7 @@ def _mask_of_guides(hair):
     """Return the vertex group that masks the guides of hair, or "". Raises `HairError` for an attribute."""
     guides = hair.vellus.guide_curves
     mask = "" if guides is None else text_of(guides.vellus.guides, "density_group")
-    if mask and mask not in hair.surface.vertex_groups:
+    if mask and mask not in curves.grown_on(hair).vertex_groups:
         sentence = 'The mask "{mask}" is not a vertex group or color attribute: clear it to paint a new one.'
         raise HairError(sentence, mask=mask)
     return mask

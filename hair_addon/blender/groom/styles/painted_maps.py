@@ -27,7 +27,7 @@ def paint(hair: Curves, item: map_items.VellusMap, context: Context) -> None:
     anything changes.
     """
     curves.require_editable(hair)
-    surface = hair.surface
+    surface = curves.grown_on(hair)
     painted_masks.require_paintable(surface, context)
     if item.kind not in MODES:
         raise HairError("Only images, vertex groups and attributes of the surface can be painted: change the kind.")
@@ -100,7 +100,7 @@ def _attribute(surface, name):
 
 def _new_name(hair, item):
     """Return a name after the setting, such as "Color Map", that no image and no source on the surface has."""
-    surface = hair.surface
+    surface = curves.grown_on(hair)
     name = item.setting.rpartition(".")[2].replace("_", " ").title()
     owners = (surface.data.attributes, surface.vertex_groups, bpy.data.images)
     return style_items.unique_name(f"{name} Map", {name_of(entry) for owner in owners for entry in owner})

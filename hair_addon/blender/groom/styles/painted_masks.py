@@ -20,7 +20,7 @@ _COLORS = ("FLOAT_COLOR", "BYTE_COLOR")
 
 def is_painting(active: Object | None) -> bool:
     """Whether an object is a surface with hair in one of Blender's paint modes."""
-    return active is not None and active.mode in PAINT_MODES and bool(selection.curves_on(active, "HAIR"))
+    return active is not None and active.mode in PAINT_MODES and bool(selection.grown_on(active))
 
 
 def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
@@ -29,7 +29,7 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     item: the style's properties. Raises `HairError` before anything changes.
     """
     curves.require_editable(hair)
-    surface, group = hair.surface, style_items.group_of(item)
+    surface, group = curves.grown_on(hair), style_items.group_of(item)
     require_paintable(surface, context)
     mask, attribute = group.mask, surface.data.color_attributes.get(group.mask)
     if not mask and group.mask_image:
@@ -70,7 +70,7 @@ def stop(surface: Object, context: Context) -> None:
     """Leave the paint mode of a surface, and select the hair whose mask was painted."""
     painted = selection.painted_hair(surface)
     bpy.ops.object.mode_set(mode="OBJECT")
-    present = reversed(selection.curves_on(surface, "HAIR"))
+    present = reversed(selection.grown_on(surface))
     wanted = present if painted is None else (painted, *present)
     shown = (selection.object_of(hair, context.view_layer) for hair in wanted)
     hair_object = next((o for o in shown if o is not None and o.visible_get(view_layer=context.view_layer)), None)
@@ -116,14 +116,14 @@ def require_paintable(surface: Object | None, context: Context) -> None:
 
 def _require_group(hair, mask):
     """Raise `HairError` if a mask is an attribute that cannot be painted."""
-    if mask and mask not in hair.surface.vertex_groups and _has_attribute(hair, mask):
+    if mask and mask not in curves.grown_on(hair).vertex_groups and _has_attribute(hair, mask):
         sentence = 'The mask "{mask}" is not a vertex group or color attribute: clear it to paint a new one.'
         raise HairError(sentence, mask=mask)
 
 
 def _has_attribute(hair, name):
     guides = hair.vellus.guide_curves
-    return name in hair.surface.data.attributes or (guides is not None and name in guides.attributes)
+    return name in curves.grown_on(hair).data.attributes or (guides is not None and name in guides.attributes)
 
 
 def canvas_of(surface: Object, name: str) -> Image:
@@ -140,15 +140,15 @@ def canvas_of(surface: Object, name: str) -> Image:
 
 def _new_name(hair, item):
     """Return a name after the style that no vertex group or attribute of surface and guides has."""
-    owners = [hair.surface.data.attributes] if hair.surface is not None else []
-    owners += [] if hair.surface is None else [hair.surface.vertex_groups]
+    surface = curves.grown_on(hair)
+    owners = [] if surface is None else [surface.data.attributes, surface.vertex_groups]
     owners += [] if hair.vellus.guide_curves is None else [hair.vellus.guide_curves.attributes]
     return style_items.unique_name(f"{item.name} Mask", {entry.name for owner in owners for entry in owner})
 
 
 def _is_guide_mask(hair, mask):
     """Whether a mask is an attribute written by `from_selection`, and no other data has its name."""
-    surface = hair.surface
+    surface = curves.grown_on(hair)
     if not mask or (surface is not None and (mask in surface.vertex_groups or mask in surface.data.attributes)):
         return False
     return read(hair.vellus.guide_curves, mask, "FLOAT", "CURVE") is not None

@@ -12,6 +12,7 @@ from bpy.types import Curves, PropertyGroup
 from ....core.styling import clump_trees, program
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
+from ...data.strands import curves
 from ...host.notices import text_of
 from ...settings import style_items
 from ...settings.translations import interface_text
@@ -68,7 +69,7 @@ def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
 
 def _has_mask(hair, name):
     """Whether surface or guides have a mask; modifiers of the surface may create any attribute."""
-    surface, guides = hair.surface, hair.vellus.guide_curves
+    surface, guides = curves.grown_on(hair), hair.vellus.guide_curves
     if surface is not None and (surface.modifiers or name in surface.vertex_groups or name in surface.data.attributes):
         return True
     return surface is None or (guides is not None and name in guides.attributes)

@@ -11,7 +11,7 @@ import bpy
 from bpy.types import Curves, Object
 
 from ...data import rest_nodes, rest_sources, usable_surfaces
-from ...data.strands import curves_objects, delivered_hair, follow_nodes
+from ...data.strands import curves, curves_objects, delivered_hair, follow_nodes
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
 from .. import frame_faces
@@ -46,7 +46,8 @@ def parting_warnings(hair: Curves) -> list[Warning]:
     found = []
     if lines and lines not in bpy.data.objects:
         found.append(Warning(interface_text('No object "{name}": pick another part line.', name=lines)))
-    if hair.surface is not None and group and group not in hair.surface.vertex_groups:
+    surface = curves.grown_on(hair)
+    if surface is not None and group and group not in surface.vertex_groups:
         text = 'No vertex group "{name}": pick another for regions.'
         found.append(Warning(interface_text(text, name=group)))
     return found

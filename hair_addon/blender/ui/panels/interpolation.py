@@ -5,7 +5,7 @@ import bpy
 
 from ....core.grooming import cost
 from ...data.scene import triangle_count
-from ...data.strands.curves import is_hand_made
+from ...data.strands.curves import grown_on, is_hand_made
 from ...groom import hair_memory
 from ...groom.selection import active_of_kind, guides_of, hair_of
 from ...groom.styles import painted_masks
@@ -46,7 +46,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         if shared:
             write(layout, context, shared, "INFO")
             layout.operator("vellus.make_own_guides")
-        setting_rows.strand_rows(layout, state.hair, hair.surface)
+        setting_rows.strand_rows(layout, state.hair, grown_on(hair))
         painting = painted_masks.is_painting(context.object)
         text, icon = ("Stop Painting", "CHECKMARK") if painting else ("Paint Density", "BRUSH_DATA")
         layout.operator("vellus.paint_density", text=text, icon=icon)
@@ -58,8 +58,8 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         if share > memory.MUCH:
             text = interface_text("These strands take {percent}% of the free memory", percent=round(100.0 * share))
             layout.label(text=text, icon="ERROR", translate=False)
-        if hair.surface is not None:
-            face_count = triangle_count(hair.surface, context.view_layer)
+        if grown_on(hair) is not None:
+            face_count = triangle_count(grown_on(hair), context.view_layer)
             costs = cost.hair_seconds, cost.hair_work_bytes
             draw_work(layout, *(cost(state.hair, face_count) for cost in costs))
         is_again = active_of_kind(context.object, "HAIR") is not None
@@ -95,7 +95,7 @@ class VELLUS_PT_interpolation_parting(HairTab, bpy.types.Panel):
     def draw(self, context):
         layout = split(self.layout)
         hair = hair_of(context.object)
-        setting_rows.parting_rows(layout, hair.vellus.hair, hair.surface)
+        setting_rows.parting_rows(layout, hair.vellus.hair, grown_on(hair))
         layout.operator("vellus.draw_parting", icon="GREASEPENCIL")
         for warning in parting_warnings(hair):
             write(layout, context, warning.text, "ERROR")

@@ -7,6 +7,7 @@ from ....core.errors import HairError
 from ....core.files import style_presets
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
+from ...data.strands.curves import grown_on
 from ...groom.selection import hair_of
 from ...groom.styles import painted_masks
 from ...groom.styles.hair_styles import points_wanted
@@ -144,7 +145,8 @@ class VELLUS_PT_styles_mask(_OfStyle, bpy.types.Panel):
     bl_idname = "VELLUS_PT_styles_mask"
 
     def draw(self, context):
-        setting_rows.style_mask_rows(split(self.layout), _active_of(context), hair_of(context.object).surface)
+        surface = grown_on(hair_of(context.object))
+        setting_rows.style_mask_rows(split(self.layout), _active_of(context), surface)
         column = self.layout.column(align=True)
         painting = painted_masks.is_painting(context.object)
         text, icon = ("Stop Painting", "CHECKMARK") if painting else ("Paint Mask", "BRUSH_DATA")
