@@ -106,6 +106,7 @@ def after_depsgraph_update(scene, depsgraph):
     _mark_painted(painted, depsgraph)
     edited = {surface for surface in deformed if surface.data in changed}
     stale_marks.follow_mapped_surfaces(edited)
+    stale_marks.follow_wet_places(edited, painted)
     live_layers.follow_masks({surface for surface in edited if surface.mode == "OBJECT"}, depsgraph)
     combed = {}
     for datablock in changed:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ..data import scene
+from ..data.simulation import wet_guides
 from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside
 from ..groom.dynamics import broken_guides, frame_folders, guide_baking, guide_simulation
@@ -36,6 +37,7 @@ class _Played:
     frame: int  # the last simulated frame
     frames: dict[int, np.ndarray] = field(default_factory=dict)  # points by frame, local at rest
     outdated: int | None = None  # the last frame that was simulated with other settings
+    wet_places: dict = field(default_factory=dict)  # of `wet_guides.places`, for the last simulated frame
     notes: tuple[HairError, ...] = ()
     worst: Broken = broken_guides.NONE
 
@@ -242,7 +244,9 @@ def _last_known(played, frame):
 
 def _begin(guides, blender_scene, depsgraph):
     simulated = guide_simulation.begin(guides, blender_scene, depsgraph)
-    played_cache.keep(guides.session_uid, _Played(simulated, scene_time.frame_of(blender_scene)))
+    wet_places = wet_guides.places(guides, simulated.masks)
+    frame = scene_time.frame_of(blender_scene)
+    played_cache.keep(guides.session_uid, _Played(simulated, frame, wet_places=wet_places))
 
 
 def _advance(played, guides, blender_scene, depsgraph, settings):
@@ -256,6 +260,10 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings, played.simulated.masks)
     if not read.varied.is_same(played.simulated.varied):
         played.outdated = played.frame
+    wet_places = wet_guides.places(guides, played.simulated.masks)
+    if wet_guides.are_others(wet_places, played.wet_places, guides):
+        played.outdated = played.frame
+    played.wet_places = wet_places
     points = played.simulated.advance(read)
     played.frame += 1
     played.worst = max(played.worst, Broken(len(played.simulated.simulation.broken), played.frame))

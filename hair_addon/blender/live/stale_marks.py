@@ -201,6 +201,21 @@ def follow_mapped_surfaces(surfaces):
             marks.mark_changed_map(item)
 
 
+def follow_wet_places(surfaces, images):
+    """Mark the simulation of guides whose wetness differs by a mask on any of some surfaces, or by any of some images,
+    which may have been painted.
+    """
+    for hair in bpy.data.hair_curves if surfaces or images else ():
+        guides = hair.vellus.guide_curves
+        if guides is None or hair.vellus.kind != "HAIR" or not guides.vellus.simulates:
+            continue
+        for item in hair.vellus.styles:
+            mask, image = style_items.masks_of(item) if item.kind == "WET" else ("", "")
+            is_painted = (mask or image) and guides.surface in surfaces
+            if is_painted or (image and any(text_of(painted, "name") == image for painted in images)):
+                guides.vellus.is_dynamics_stale = True
+
+
 def follow_ramps():
     """Mark hair and guides with an edited ramp of the thickness or of a map, which Blender does not report.
 

@@ -45,6 +45,19 @@ def unkeyed(guides, depsgraph):
     return amounts[:, None] * [_weights(guides, surface, depsgraph, mask_key(style), known) for style in styles]
 
 
+def places(guides, known):
+    """Return {mask: (G,) weights} of the masks of wetness that `of_guides` has read into `known`."""
+    keys = (mask_key(style) for style in shared_wetness.masked_styles(guides.vellus))
+    return {key: known[key] for key in keys if key in known}
+
+
+def are_others(now, before, guides):
+    """Return whether `places` have other weights than before, or other masks while no wetness is keyed."""
+    if now.keys() != before.keys() and not shared_wetness.is_keyed(guides.vellus):
+        return True
+    return any(key in before and not np.array_equal(weights, before[key]) for key, weights in now.items())
+
+
 def _weights(guides, surface, depsgraph, key, known, roots=None):
     """Return (G,) float32 weights of a mask, cached in `known`."""
     if key not in known:

@@ -185,3 +185,31 @@ def test_stiffness_of_another_number_of_strands_is_an_error():
     lengths = np.full((3, 8), 0.01)
     with pytest.raises(HairError, match="stiffnesses"):
         material.material_of(DynamicsSettings(), lengths, stiffness=np.ones(2))
+
+
+def test_a_mask_of_wetness_that_changes_during_playback_outdates_earlier_frames(played):
+    """A new mask of *Wet* and its painted weights make played and baked frames outdated; equal weights do not."""
+    guides, hair = played
+    name, sphere = half_group(), bpy.data.objects["Sphere"]
+    api.add_style(hair, "WET", amount=0.8)
+    play(1, 3)
+    hair.vellus.styles[0].wet.mask = name
+    bpy.context.view_layer.update()
+    play(4, 5)
+    sentence, values = dynamics_state.state_of(guides)
+    assert "with other settings" in sentence and values["frame"] == 3
+    play(1, 5)
+    for weight, is_outdated in ((0.4, True), (0.4, False)):
+        play(1, 5)
+        sphere.vertex_groups[name].add(range(len(sphere.data.vertices)), weight, "REPLACE")
+        sphere.data.update_tag()
+        bpy.context.view_layer.update()
+        play(6, 7)
+        assert ("with other settings" in dynamics_state.state_of(guides)[0]) == is_outdated
+    baked(guides)
+    bpy.context.view_layer.update()
+    assert dynamics_state.state_of(guides)[0] == "Frames {first} to {last} are baked"
+    sphere.vertex_groups[name].add(range(len(sphere.data.vertices)), 0.9, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    assert "with other settings" in dynamics_state.state_of(guides)[0]
