@@ -1,7 +1,7 @@
 # make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare turntable dynamics pictures test farm desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable dynamics pictures test farm long desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # Let uv use the system's certificates, as pip does: some networks have their own.
@@ -21,16 +21,19 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
 # As many processes test as there are processors: threads of Mesa and of OpenBLAS would only wait for one another.
-test farm: export LP_NUM_THREADS = 0
-test farm: export OPENBLAS_NUM_THREADS = 1
+test farm long: export LP_NUM_THREADS = 0
+test farm long: export OPENBLAS_NUM_THREADS = 1
 
 # All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except benchmarks and tests in a window, in up to four processes
 	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)
 	$(python) -m pytest -m "not long and not desktop and not farm" --ignore tests/desktop --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
-farm: $(installed) ## tests of processes that share frames, and of farms on this machine: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
-	$(python) -m pytest -m farm --numprocesses 2 --dist loadfile tests/command_line tests/blender/io $(ARGS)
+farm: $(installed) ## tests of other processes and render engines, and of farms: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
+	$(python) -m pytest -m "farm and not long" --numprocesses 2 --dist loadfile $$(grep -rl --include='*.py' mark.farm tests) $(ARGS)
+
+long: $(installed) ## in an hour: the rest of the parameters of which `make test` runs a share
+	$(python) -m pytest -m "long and not desktop" --ignore tests/desktop --ignore tests/benchmarks --numprocesses auto --dist loadfile $(ARGS)
 
 # Three processes, as walks wait for a quarter of their time.
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop

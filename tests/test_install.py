@@ -113,6 +113,7 @@ def test_installs_and_enables(walk):
     assert walk.used["installed"] == {"result": ["FINISHED"], "enabled": True}
 
 
+@pytest.mark.farm
 def test_installed_operators_run(walk, used):
     made = used["operators"]
     assert made["results"] == [["FINISHED"]] * 5
@@ -132,6 +133,7 @@ def test_code_of_readme_and_docstrings_runs_in_the_extension(used):
     assert (ran["blocks"], ran["examples"] > 60) == (3, True)
 
 
+@pytest.mark.farm
 def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
     before, enabled, disabled, enabled_again, disabled_again = walk("twice")["states"]
     assert enabled["operators"] == sorted(operator.bl_idname.split(".")[1] for operator in operators.CLASSES)

@@ -51,6 +51,7 @@ def test_a_wheel_holds_the_half_for_arrays_and_its_types(wheel):
     assert {source for source in sources if "__pycache__" not in source} <= names
 
 
+@pytest.mark.farm
 def test_scripts_work_on_arrays_without_blender(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path / "wheel")
     run = [sys.executable, "-c", SCRIPT]

@@ -114,6 +114,7 @@ def assert_memory_is_as_said(side_count, guide_count, strand_count):
     assert reported / FACTOR < took < reported * FACTOR
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="no measure of a process's most memory")
 @pytest.mark.parametrize(
     "counts", [pytest.param((400, 500, 1000), marks=pytest.mark.long), (30, 20_000, 1000), (30, 500, 200_000)]

@@ -47,13 +47,19 @@ def headings(page):
     return re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
 
 
+@functools.cache
+def anchors(page):
+    """Return {anchor: heading} of a page."""
+    return {manual.anchor(title): title for title in headings(page)}
+
+
 def heading_at(found):
     """Return the heading that an address leads to, or None."""
     file, _, fragment = (found or "").partition("#")
     page = Path(urllib.parse.unquote(urllib.parse.urlsplit(file).path))
     if page.suffix != ".md" or not page.is_file():
         return None
-    return {manual.anchor(title): title for title in headings(page)}.get(fragment)
+    return anchors(page).get(fragment)
 
 
 def test_every_property_and_operator_leads_to_its_heading():

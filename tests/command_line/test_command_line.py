@@ -278,6 +278,7 @@ def test_every_engine_is_available(capsys):
     assert f"{{{','.join(frames.ENGINES)}}}" in capsys.readouterr().out
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize("engine", ["cycles", "eevee"])
 def test_other_engines_render_the_same_frames(shot, tmp_path, engine):
     out = tmp_path / "f_#.png"
@@ -387,6 +388,7 @@ def test_every_verb_explains_itself(capsys):
         assert "--json" in capsys.readouterr().out
 
 
+@pytest.mark.farm
 def test_json_output_contains_only_results(mesh, tmp_path):
     """JSON output contains only results, whatever importers, exporters and Warp print on standard output."""
     groom = ("groom", mesh, *SMALL, "--out", tmp_path / "a.usdc", "--json")

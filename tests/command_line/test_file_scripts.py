@@ -33,6 +33,7 @@ def written(folder):
     return {path.name for path in folder.iterdir()} & {"from_script", "from_driver"}
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize(("verb", "run"), [*((verb, run_here) for verb in VERBS), ("info", run)])
 def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
     """No script or driver of a file runs in a separate process, where no test has given permission."""
@@ -43,6 +44,7 @@ def test_nothing_of_its_own_runs(stranger, tmp_path, verb, run):
     assert len(ended.errors.splitlines()) == 1
 
 
+@pytest.mark.farm
 def test_all_of_it_runs_when_the_user_asks(stranger, tmp_path):
     """All scripts and drivers run in a new process if the user allows it, which Blender remembers per process."""
     ended = run(*VERBS["groom"](stranger, tmp_path), "--enable-scripts")

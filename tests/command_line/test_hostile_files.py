@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, largest_file, run_here, write_obj
+from tests.support.pairs import pairs
 
 SMALL = ("--guides", 5, "--strands", 20)
 
@@ -78,8 +79,7 @@ def test_a_whole_file_is_read(mesh, ending):
     assert run_here("groom", path, *SMALL, "--out", path.parent / "out.npz").status == 0
 
 
-@pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize(("ending", "part"), pairs(ENDINGS, [0.0, 0.3, 0.9], 2))
 def test_truncated_files_are_refused(mesh, ending, part):
     path = mesh(f"short{ending}")
     content = path.read_bytes()
@@ -237,6 +237,7 @@ def run_mounted(mounting, words, folder):
     return done, folder.with_name(folder.name + ".left").read_text().split()
 
 
+@pytest.mark.farm
 @needs_mounts
 @pytest.mark.parametrize(
     "kind",
@@ -251,6 +252,7 @@ def test_a_disk_that_is_really_full(words, tmp_path, kind):
     assert left in ([], ["out"])  # the folder of tables
 
 
+@pytest.mark.farm
 @needs_mounts
 @pytest.mark.parametrize("kind", [".exr", ".json", *(pytest.param(kind, marks=SLOW) for kind in (".npz", "tables"))])
 def test_a_read_only_folder_is_reported(words, tmp_path, kind):

@@ -45,6 +45,7 @@ def seen():
 
 
 # All are handled alike, .abc too.
+@pytest.mark.farm
 @pytest.mark.parametrize("ending", [".usdc", ".ply", pytest.param(".gltf", marks=pytest.mark.long)])
 def test_another_process_gives_the_same_scene(files, tmp_path, ending):
     up = "Y" if ending == ".ply" else "Z"
@@ -89,6 +90,7 @@ def test_curves_are_tried_apart(files, tmp_path, monkeypatch):
     )
 
 
+@pytest.mark.farm
 def test_messages_of_the_other_process_are_reported(files):
     files[".usdc"].write_bytes(files[".usdc"].read_bytes()[:200])
     ended = run_here("info", files[".usdc"], reads_apart=True)

@@ -226,6 +226,7 @@ def linked(tmp_path_factory):
     return folder
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize(
     ("file", "becomes", "reported"),
     [

@@ -218,6 +218,7 @@ def test_a_scene_without_a_view_layer_is_not_rendered(lit, tmp_path, engine):
 # Standard output.
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize(
     ("words", "redirected"),
     [

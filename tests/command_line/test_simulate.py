@@ -36,6 +36,7 @@ def shot(lit, tmp_path):
     return path
 
 
+@pytest.mark.farm
 def test_frames_are_baked_and_rendered(shot, tmp_path):
     first = run_here("simulate", shot, "--json", "--last-frame", "3")
     assert [line["frame"] for line in first.results] == [2, 3, 4]  # one more for motion blur

@@ -92,6 +92,7 @@ def test_styles_are_applied_in_the_order_of_the_words(scene, mesh, tmp_path):  #
     assert grown(out)[0].styles == (frizz.Settings(), curl.Settings(seed=1))
 
 
+@pytest.mark.long
 def test_style_presets_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
     out = tmp_path / "out.blend"
     groom = ("groom", mesh, *SMALL, "--out", out, "--style-preset", "FRIZZY")

@@ -21,6 +21,7 @@ def test_sculpt_mode_opens(kind, request):
     assert np.array_equal(points(made), before)
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
 def test_blender_renders_the_hair(lit, engine, tmp_path):
     """Blender renders the hair: strands cover the pixels that they cross on a twisted surface, and are lit; guides

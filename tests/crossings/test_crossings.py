@@ -58,7 +58,7 @@ def drawn(hair):
     return hair_cache.strands_on_gpu(hair.data).points
 
 
-@pytest.mark.parametrize(("deformer", "strand_count"), pairs(DEFORMERS, [40_000, 20], 2))
+@pytest.mark.parametrize(("deformer", "strand_count"), pairs(DEFORMERS, [40_000, 20], 4))
 def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, strand_count):
     """With another strand count on a deformed surface, the picture shows the strands to be written, at their own
     roots.
@@ -130,8 +130,7 @@ def edit_mesh(guides, _hair):
 CHANGES = [change_guide_length, comb, change_radius, change_strand_count, edit_mesh]
 
 
-@pytest.mark.parametrize("is_reloaded", [False, True])
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(("change", "is_reloaded"), pairs(CHANGES, [False, True], 2))
 @pytest.mark.parametrize("is_window", [False, True])
 def test_emptied_hair_is_kept_after_changes(hair, monkeypatch, tmp_path, change, is_window, is_reloaded):
     """Emptied hair stays empty after changes, as edited by hand with a message, and the operator of its button grows

@@ -15,6 +15,7 @@ from hair_addon.core.params import from_surface
 from tests.support import remembered
 from tests.support.commands import run_here
 from tests.support.devices import DEVICE
+from tests.support.pairs import share_of_rows
 from tests.support.reading import points
 
 FEW = {"guide_count": 40, "strand_count": 300}
@@ -78,7 +79,9 @@ def hair_on(surface, **changes):
     return sorted(made, key=lambda curves: curves.vellus.kind)
 
 
-@pytest.mark.parametrize(("add", "side"), [(add_cube, (0.3, -0.5, 1.0)), (add_monkey, (0.2, -1.0, 0.2))])
+@pytest.mark.parametrize(
+    ("add", "side"), share_of_rows([(add_cube, (0.3, -0.5, 1.0)), (add_monkey, (0.2, -1.0, 0.2))], 2)
+)
 def test_hair_covers_its_surface(scene, add, side):
     surface = add(scene)
     _guides, hair = hair_on(surface)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of tests of long lists and of all pairs: `make test` runs a share of them, `pytest -m long` the rest."""
+"""Parameters of tests of long lists and of all pairs: `make test` runs a share of them, `make long` the rest."""
 
 from collections.abc import Iterable
 
@@ -23,3 +23,8 @@ def pairs(rows: Iterable, columns: Iterable, share: int = 3) -> list:
         for i, row in enumerate(rows)
         for j, column in enumerate(columns)
     ]
+
+
+def share_of_rows(rows: Iterable, share: int = 3) -> list:
+    """As `share_of` for `pytest.mark.parametrize` with several names: one row of values in `share` is not `long`."""
+    return [pytest.param(*row, marks=() if i % share == 0 else pytest.mark.long) for i, row in enumerate(rows)]

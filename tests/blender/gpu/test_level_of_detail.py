@@ -12,6 +12,7 @@ from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures
 from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture
+from tests.support.pairs import share_of
 from tests.support.pictures import glsl
 
 SIZE = 96
@@ -135,7 +136,7 @@ def test_passes_take_all_strands_in_turn_but_those_that_the_artist_leaves_out(ma
     assert {(one.strand_count, one.first_strand) for one in few} == {(12_500, 0)}
 
 
-@pytest.mark.parametrize("distance", [8.0, 20.0])
+@pytest.mark.parametrize("distance", share_of([8.0, 20.0], 2))
 def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     """Distant hair, drawn with fewer and thicker strands, has the light and coverage of all strands.
 

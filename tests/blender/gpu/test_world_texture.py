@@ -147,6 +147,7 @@ def mixed_world(scene):
     return mapping.inputs["Rotation"], mix.inputs[0]
 
 
+@pytest.mark.farm
 def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path, monkeypatch):
     """The panorama has the radiance that light rays see in Cycles, in all directions, and is rendered once."""
     if Path("/dev/shm").is_dir():

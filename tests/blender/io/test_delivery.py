@@ -71,6 +71,7 @@ def largest_difference(some, others):
     return max(abs(some[time] - others[time]).max() for time in some)
 
 
+@pytest.mark.farm
 @pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
     """A Blender without the add-on has the same hair and picture, and its own exporter writes the same hair."""

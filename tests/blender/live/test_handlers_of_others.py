@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import bpy
+import pytest
 
 from hair_addon.blender.live import updates
 from tests.support.commands import PYTHONPATH
@@ -14,6 +15,7 @@ from tests.support.commands import PYTHONPATH
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.farm
 def test_hair_that_another_handler_deletes_does_not_end_blender():
     program = [sys.executable, "-m", "tests.support.walk.walk_handlers_of_others"]
     environment = os.environ | {"PYTHONPATH": PYTHONPATH}

@@ -113,7 +113,7 @@ class Changing:
 OFFER_OF_KINDS = {offer.kind: name for name, offer in OFFERS.items()}.values()
 
 
-@pytest.mark.parametrize("offer", share_of(OFFER_OF_KINDS, 2))
+@pytest.mark.parametrize("offer", share_of(OFFER_OF_KINDS, 4))
 def test_changes_of_a_style_keep_nothing_of_those_before(hair, offer):
     changing = Changing(hair, offer, 40)
     for begin in (changing.dragged, changing.keyed, changing.driven):

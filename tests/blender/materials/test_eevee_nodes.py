@@ -27,6 +27,7 @@ def rendered_hair(engine, folder):
     return pixels[:, :3].sum(axis=0) / pixels[:, 3].sum(), pixels[:, 3].mean()
 
 
+@pytest.mark.farm
 @even_guides
 def test_it_is_lit_about_as_by_cycles(lit, tmp_path):
     """EEVEE lights and covers hair approximately as Cycles does; strands at least a pixel wide would cover five

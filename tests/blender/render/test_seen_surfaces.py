@@ -10,6 +10,7 @@ import pytest
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.pairs import share_of
 from tests.support.pictures.rendering import add_orthographic_camera
 
 SIZE = 48
@@ -189,7 +190,7 @@ def test_what_is_indirect_only_is_not_seen(stage):
     np.testing.assert_allclose(seen_color(picture()), bare, rtol=0.02)
 
 
-@pytest.mark.parametrize("scattering", ["DUAL", "GRID"])
+@pytest.mark.parametrize("scattering", share_of(["DUAL", "GRID"], 2))
 def test_hair_behind_what_the_camera_does_not_see_is_lit(scattering, stage):
     stage.vellus.multiple_scattering = scattering
     skin = plane(matt(0.5, 0.4, 0.3), size=0.8, depth=0.1, name="Skin")

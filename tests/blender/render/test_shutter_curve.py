@@ -32,6 +32,7 @@ def columns(picture):
     return light / light.sum()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ends", share_of([(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]))
 def test_light_comes_when_the_shutter_is_open_as_in_cycles(scene, tmp_path, ends):
     moving_square(scene)

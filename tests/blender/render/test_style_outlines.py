@@ -46,6 +46,7 @@ def luminance(picture):
     return picture[..., :3].sum() / picture[..., 3].sum()
 
 
+@pytest.mark.long
 def test_coily_hair_is_narrower_than_curly(pictures):
     assert width(pictures["COILY"]) < width(pictures["CURLY"])
 

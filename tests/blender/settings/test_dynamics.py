@@ -201,6 +201,7 @@ def test_settings_are_kept_in_a_file_and_in_copies(state, tmp_path):
     assert bpy.data.objects["Sphere"].vellus.is_double_sided
 
 
+@pytest.mark.farm
 def test_properties_come_and_go_with_the_add_on():
     """Registering twice in a separate Blender leaves no property group on objects and Curves."""
     program = (

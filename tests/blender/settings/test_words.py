@@ -11,6 +11,7 @@ from hair_addon.blender.settings import translations
 from hair_addon.blender.ui import panels, setting_rows
 from tests.support.interface import interface_strings
 from tests.support.interface.layout import draw
+from tests.support.pairs import pairs
 from tools import manual_pages
 
 BRITISH = re.compile(
@@ -82,8 +83,9 @@ def test_names_fit_the_sidebar(locale):
     assert {name: (width(name), where) for name, where in names.items() if width(name) > room} == {}
 
 
-@pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])
-@pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])
+@pytest.mark.parametrize(
+    ("active", "locale"), pairs(["Sphere", "Guides", "Hair"], ["en_US", *translations.dictionaries()], 2)
+)
 def test_buttons_fit_the_sidebar(hair, active, locale):
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
     layouts = [draw(panel) for panel in panels.CLASSES if panel.bl_region_type == "UI"]

@@ -24,7 +24,7 @@ from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.interface.layout import draw, draw_all
 from tests.support.invariants import operate
-from tests.support.pairs import share_of
+from tests.support.pairs import pairs, share_of
 from tests.support.reading import points, write_points
 
 SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # of the sphere's default hair length
@@ -64,8 +64,7 @@ def still(hair):
     return hair
 
 
-@pytest.mark.parametrize("offer", OFFERS)
-@pytest.mark.parametrize("is_fitted", [True, False])
+@pytest.mark.parametrize(("offer", "is_fitted"), pairs(OFFERS, [True, False], 2))
 def test_the_menu_adds_its_styles(hair, offer, is_fitted):
     state().is_live = is_fitted  # locks for a head would be tens of thousands
     for _ in range(2):
@@ -178,7 +177,7 @@ def test_styles_are_saved_appended_and_copied_with_their_hair(styled, tmp_path):
 # Presets.
 
 
-@pytest.mark.parametrize("preset", share_of(style_presets.PRESETS))
+@pytest.mark.parametrize("preset", share_of(style_presets.PRESETS, 8))
 def test_presets_replace_styles_and_leave_the_rest(styled, preset):
     before = groom_settings.settings_of(styled.data)
     state().is_live = False  # locks for a head would be tens of thousands

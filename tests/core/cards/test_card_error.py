@@ -12,6 +12,7 @@ from hair_addon.core.cards.card_layout import CardStrands, Placement
 from hair_addon.core.cards.card_settings import CardSettings, Level
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.core.cards.conftest import sphere, wavy_hair
+from tests.support.pairs import share_of_rows
 
 SAMPLES = 128  # fewer than the default take less time
 LEVEL = Level(40, 6, 256)
@@ -70,7 +71,7 @@ def test_more_cards_have_less_error(comparison, strands):
     assert errors[0] > errors[1] > errors[2] > 0.0
 
 
-@pytest.mark.parametrize(("scale", "place"), [(0.01, 0.0), (100.0, 0.0), (1.0, 30.0)])
+@pytest.mark.parametrize(("scale", "place"), share_of_rows([(0.01, 0.0), (100.0, 0.0), (1.0, 30.0)], 2))
 def test_the_error_does_not_depend_on_unit_and_place(comparison, strands, scale, place):
     """Cards of scaled or moved strands have the error of the original cards, within rounding."""
     surface = TriMesh(np.float32(scale * strands.surface.vertices + place), strands.surface.triangles)
@@ -85,6 +86,7 @@ def test_crossed_cards_have_less_error_than_as_many_single_cards(comparison, str
     assert error(comparison, strands, 40, crossed=1.0).coverage < 0.8 * error(comparison, strands, 40).coverage
 
 
+@pytest.mark.long
 def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, strands, monkeypatch):
     """The best placement has at most the error of the default one, for the same number of cards."""
     monkeypatch.setattr(best_placement, "_TIP", ())

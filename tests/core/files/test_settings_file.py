@@ -75,7 +75,7 @@ def head(**sections):
 
 
 @given(wanted=GROOMS)
-@settings(max_examples=40)
+@settings(max_examples=15)
 def test_settings_come_back_as_they_went(tmp_path_factory, wanted):
     path = tmp_path_factory.mktemp("settings") / "groom.json"
     settings_file.write(path, wanted)
@@ -83,7 +83,7 @@ def test_settings_come_back_as_they_went(tmp_path_factory, wanted):
 
 
 @given(wanted=GROOMS)
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_what_is_written_keeps_to_the_schema(wanted):
     check(json.loads(json.dumps(settings_file.to_object(wanted))), settings_file.schema())
 
@@ -158,7 +158,7 @@ def test_files_without_dynamics_are_read(tmp_path):
 
 
 @given(wanted=GROOMS, present=GROOMS, kept=st.sets(st.sampled_from([*SECTIONS, "styles"])))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present, kept):
     values = settings_file.to_object(wanted)
     path = tmp_path_factory.mktemp("partial") / "some.json"

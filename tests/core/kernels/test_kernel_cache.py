@@ -87,6 +87,7 @@ def digest(cache):
     return {path: path.read_bytes() for path in cache.rglob("*.o")}
 
 
+@pytest.mark.farm
 def test_damaged_entries_are_compiled_again(cache, tmp_path):
     """Damaged entries are compiled again, one of them while another thread compiles a different one."""
     code = file_of(cache, "bspline", ".o")
@@ -163,6 +164,7 @@ needs_mounts = pytest.mark.skipif(
 )
 
 
+@pytest.mark.farm
 @needs_mounts
 @pytest.mark.parametrize("options", ["size=64k", "size=64m,ro"], ids=["full", "read-only"])
 def test_a_disk_that_takes_no_kernel_is_left_for_a_temporary_folder(temporary, tmp_path, options):

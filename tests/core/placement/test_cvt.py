@@ -21,6 +21,7 @@ from hair_addon.core.placement.exact_cells import CutCells
 from hair_addon.core.placement.voronoi import sites_on
 from tests.support.devices import DEVICE
 from tests.support.meshes import subdivided_sphere
+from tests.support.pairs import share_of
 from tests.support.strands import evenness
 
 relax = partial(evenness.relax, device=DEVICE)
@@ -229,7 +230,7 @@ def test_energy_is_below_lloyds_from_the_same_start(surfaces, name):
     assert learned[-1] < lloyd[-1] < lloyd[0]
 
 
-@pytest.mark.parametrize("name", ["scalp", "sphere", "square"])
+@pytest.mark.parametrize("name", share_of(["scalp", "sphere", "square"], 2))
 def test_placed_sites_are_even(surfaces, name):
     """Sites placed by a dozen rounds from coarse to fine are more even than by forty of Lloyd's."""
     mesh, density = surfaces[name]
@@ -241,7 +242,7 @@ def test_placed_sites_are_even(surfaces, name):
     assert placed.share_variation < 0.12
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 5, 17, 99, 100, 101, 250, 777])
+@pytest.mark.parametrize("count", share_of([1, 2, 3, 5, 17, 99, 100, 101, 250, 777], 2))
 def test_as_many_sites_as_asked_for(surfaces, count):
     for mesh, density in surfaces.values():
         sites = place(mesh, count, 3, 3, density=density)

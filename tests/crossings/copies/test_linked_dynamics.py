@@ -10,6 +10,7 @@ import pytest
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.core.long_work import run_now
 from tests.support.dynamics.swung import simulate, swing
+from tests.support.pairs import share_of
 from tests.support.reading import evaluated_points, points
 
 FRAME = 7
@@ -71,7 +72,7 @@ def shown_hair():
     return next((o for o in found if o.override_library is not None), found[0])
 
 
-@pytest.mark.parametrize("way", ["linked", "instance", "override", "local hair"])
+@pytest.mark.parametrize("way", share_of(["linked", "instance", "override", "local hair"]))
 def test_a_shot_bakes_and_shows_a_linked_character(character, tmp_path, way):
     path, there = character
     in_library = path.read_bytes()

@@ -50,7 +50,7 @@ def stand(place):
 
 
 @pytest.mark.parametrize("is_picked", [False, True], ids=["selected", "picked"])
-@pytest.mark.parametrize(("is_deleted", "place"), pairs([False, True], PLACES))
+@pytest.mark.parametrize(("is_deleted", "place"), pairs([False, True], PLACES, 5))
 def test_attached_hair_stays_where_it_is(placed_file, place, is_deleted, is_picked):
     bpy.ops.wm.read_homefile(filepath=placed_file)
     if is_deleted:

@@ -16,6 +16,7 @@ from tests.support.reading import points
 ROOT = Path(__file__).resolve().parents[3]
 
 
+@pytest.mark.farm
 def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
     """Hair with unreadable names is drawn, edited and saved, and its layers of guides can be renamed."""
     program = [sys.executable, "-m", "tests.support.walk.walk_unreadable_names", str(tmp_path)]

@@ -56,7 +56,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, ["turned", "mirrored", "on a scaled rig"]))
+@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, ["turned", "mirrored", "on a scaled rig"], 5))
 def test_baked_frames_play_where_they_did(baked_files, place, change):
     bpy.ops.wm.open_mainfile(filepath=baked_files(place))
     scene, guides = bpy.context.scene, bpy.data.objects["Hair Guides"].data

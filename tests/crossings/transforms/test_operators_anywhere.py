@@ -69,7 +69,7 @@ def require_same(found, wanted, size, name=""):
 # ------------------------------------------------------------------------------------------ guides
 
 
-@pytest.mark.parametrize(("with_body", "place"), pairs([False, True], CHOSEN, 3))
+@pytest.mark.parametrize(("with_body", "place"), pairs([False, True], CHOSEN, 5))
 def test_own_guides_are_copies_in_place(placed_files, place, with_body):
     """Own guides are copies in place: hair does not move, and they have the original guides' places on their
     surface.

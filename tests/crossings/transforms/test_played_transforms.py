@@ -9,6 +9,7 @@ from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair, simulated_hair
 from tests.support import placed_hair
 from tests.support.exchange.imported import select
+from tests.support.pairs import share_of
 from tests.support.placed_hair import require_carried, seen
 
 APPLIED, LAST = 4, 6
@@ -128,7 +129,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", share_of(CASES, 2))
 def test_what_is_played_goes_on_as_if_no_transform_were_applied(played, case):
     place, is_bent, add_body, points = CASES[case]
     guides = played(place, is_bent, add_body)

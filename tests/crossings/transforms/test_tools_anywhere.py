@@ -56,7 +56,7 @@ def after_tool(path, tool, values, is_applied):
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), pairs(TOOLS, PLACES, 5), ids=lambda one: one if isinstance(one, str) else " ".join(one)
+    ("name", "place"), pairs(TOOLS, PLACES, 9), ids=lambda one: one if isinstance(one, str) else " ".join(one)
 )
 def test_tools_do_the_same_in_the_world(placed_files, place, name):
     tool, values = name[0], TOOLS[name]

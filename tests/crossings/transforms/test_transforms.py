@@ -14,7 +14,7 @@ from hair_addon.blender.live import handlers
 from hair_addon.blender.settings import style_items
 from tests.support import placed_hair, rooted
 from tests.support.exchange.imported import select
-from tests.support.pairs import pairs
+from tests.support.pairs import pairs, share_of_rows
 from tests.support.placed_hair import PLACES, Placed, require_carried, seen
 from tests.support.reading import points
 
@@ -140,7 +140,7 @@ CHANGES = {
 SELECTED_TOO = [name for name in CHANGES if "and hair" in name]
 
 
-@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, PLACES, 5), indirect=["place"])
+@pytest.mark.parametrize(("change", "place"), pairs(CHANGES, PLACES, 9), indirect=["place"])
 def test_hair_goes_wherever_its_surface_goes(place, change):
     if place == "on a sheared rig" and change in SELECTED_TOO:
         pytest.skip("Blender itself distorts what is selected")
@@ -152,11 +152,13 @@ def test_hair_goes_wherever_its_surface_goes(place, change):
 
 @pytest.mark.parametrize(
     ("place", "change"),
-    [
-        ("mirrored, subdivided 1", "apply scale"),
-        ("mirrored, subdivided 1", "apply all"),
-        ("mirrored, subdivided 2", "Apply Scale of the panel"),
-    ],
+    share_of_rows(
+        [
+            ("mirrored, subdivided 1", "apply scale"),
+            ("mirrored, subdivided 1", "apply all"),
+            ("mirrored, subdivided 2", "Apply Scale of the panel"),
+        ]
+    ),
     indirect=["place"],
 )
 def test_hair_stays_where_faces_that_are_subdivided_are_turned(place, change):

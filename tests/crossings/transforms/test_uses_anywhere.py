@@ -124,7 +124,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("place", share_of(PLACES, 3))
+@pytest.mark.parametrize("place", share_of(PLACES, 5))
 def test_files_have_hair_where_it_is_shown(placed_files, tmp_path, place):
     opened(placed_files(place))
     before, meters = seen(), bpy.context.scene.unit_settings.scale_length
@@ -160,7 +160,7 @@ MESHES = {
 
 
 @pytest.mark.parametrize(
-    ("made", "place"), pairs(MESHES, ["large", "uneven", "mirrored", "mirrored and uneven", "on a sheared rig"], 2)
+    ("made", "place"), pairs(MESHES, ["large", "uneven", "mirrored", "mirrored and uneven", "on a sheared rig"], 4)
 )
 def test_meshes_of_hair_are_where_it_is(placed_files, place, made):
     """Meshes of hair are where the hair is, and their faces have the same orientation, also on mirrored surfaces."""

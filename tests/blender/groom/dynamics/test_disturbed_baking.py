@@ -13,6 +13,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support.dynamics.swung import simulate, swing
 from tests.support.interface.modal import TIMER, Operator
+from tests.support.pairs import share_of
 from tests.support.reading import points
 
 LAST, PRESENT = 8, 3
@@ -60,7 +61,7 @@ def redo():
     assert bpy.ops.ed.redo() == {"FINISHED"}
 
 
-@pytest.mark.parametrize("disturb", [rename, duplicate, undo, redo])
+@pytest.mark.parametrize("disturb", share_of([rename, duplicate, undo, redo], 2))
 def test_baking_goes_on_to_the_same_frames(guides, disturb):
     bake(guides)
     folder = frame_folders.folder_of(guides.data)

@@ -16,6 +16,7 @@ from hair_addon.blender.render import film, offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.commands import PYTHONPATH
+from tests.support.pairs import share_of
 from tests.support.pictures.rendering import configure, layers_of, light_up, read_layers, rendered
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -91,7 +92,7 @@ def test_a_border_between_pixels_is_rounded_as_blender_does(lit, tmp_path):
     assert part.shape[1] == 600
 
 
-@pytest.mark.parametrize("is_cropped", [False, True])
+@pytest.mark.parametrize("is_cropped", share_of([False, True], 2))
 def test_a_border_is_rendered_as_in_the_whole_picture(lit, fine_shadows, tmp_path, is_cropped):
     whole = rendered(tmp_path, film_transparent=True)["Combined"]
     border = {"border_min_x": 0.3, "border_max_x": 0.71, "border_min_y": 0.2, "border_max_y": 0.66}
@@ -351,6 +352,7 @@ def test_an_edge_is_as_soft_as_the_filter_is_wide(scene, tmp_path, sample_count)
     assert 2 <= ((alpha[0] > 0.01) & (alpha[0] < 0.99)).sum() <= 4
 
 
+@pytest.mark.farm
 def test_a_script_that_renders_exits_normally():
     """A script that renders exits normally, because programs and textures are freed before Blender's graphics; its
     first function of `api` registers the add-on.

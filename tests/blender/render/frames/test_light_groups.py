@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from tests.support.pairs import share_of
 from tests.support.pictures.rendering import light_up, rendered
 
 SIZE = {"resolution_x": 32, "resolution_y": 24, "sample_count": 4}
@@ -32,7 +33,7 @@ def groups_of(passes):
     return {name.removeprefix("Combined_"): light for name, light in passes.items() if name.startswith("Combined_")}
 
 
-@pytest.mark.parametrize("how", ["DUAL", "GRID", "motion blur", "panorama"])
+@pytest.mark.parametrize("how", share_of(["DUAL", "GRID", "motion blur", "panorama"], 2))
 def test_groups_sum_to_the_picture(grouped, tmp_path, how):
     """The passes sum to the picture within 1e-4, including the background, and the picture equals that without
     groups.
@@ -51,7 +52,7 @@ def test_groups_sum_to_the_picture(grouped, tmp_path, how):
     scene.render.use_motion_blur = False
 
 
-@pytest.mark.parametrize("kind", ["DUAL", "GRID"])
+@pytest.mark.parametrize("kind", share_of(["DUAL", "GRID"], 2))
 def test_a_group_is_a_picture_by_its_lights_alone(grouped, tmp_path, kind):
     """The pass of a group equals the picture with all other lights off, of hair and of surfaces, except for noise."""
     scene = bpy.context.scene

@@ -7,6 +7,7 @@ import OpenEXR
 import pytest
 
 from hair_addon.blender.render.frames import composite
+from tests.support.pairs import share_of_rows
 from tests.support.pictures.rendering import configure, rendered
 
 WIDTH, HEIGHT = 96, 72
@@ -52,7 +53,7 @@ def overlap(one, other):
 
 @pytest.mark.parametrize(
     ("mode", "fit", "pivot"),
-    [("OFFAXIS", "HORIZONTAL", "LEFT"), ("OFFAXIS", "VERTICAL", "CENTER"), ("TOE", "AUTO", "RIGHT")],
+    share_of_rows([("OFFAXIS", "HORIZONTAL", "LEFT"), ("OFFAXIS", "VERTICAL", "CENTER"), ("TOE", "AUTO", "RIGHT")], 2),
 )
 def test_each_eye_sees_what_it_sees_in_cycles(pair, tmp_path, mode, fit, pivot):
     pair.camera.data.stereo.convergence_mode, pair.camera.data.sensor_fit = mode, fit

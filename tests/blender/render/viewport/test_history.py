@@ -80,7 +80,7 @@ def biggest_change(frames):
 MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera), ("HAIR", turn_light)]
 
 
-@pytest.mark.parametrize("movement", share_of(MOVEMENTS, 2))
+@pytest.mark.parametrize("movement", share_of(MOVEMENTS))
 def test_what_moves_changes_no_more_than_pictures_at_rest(lit, movement):
     """At a degree per frame with one sample per pixel, pictures change at most 1.2 times as much and are as bright."""
     kind, turn = movement
@@ -100,7 +100,7 @@ def test_what_moves_changes_no_more_than_pictures_at_rest(lit, movement):
     np.testing.assert_allclose(*means, rtol=0.03)
 
 
-@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+@pytest.mark.parametrize("kind", share_of(["HAIR", "FILM"], 2))
 def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
     picture, drawn = new_picture(kind), read_drawn()
     for degrees in (0.0, 2.0, 4.0):
@@ -114,7 +114,7 @@ def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
 
 
 @even_guides
-@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+@pytest.mark.parametrize("kind", share_of(["HAIR", "FILM"], 2))
 def test_nothing_remains_where_something_has_been(lit, kind):
     """Hair that moves by a tenth of the picture's width a frame leaves no trail, also where it moved away."""
     picture = new_picture(kind)

@@ -65,6 +65,7 @@ def test_small_hair_is_as_bright_and_covers_as_much(locks):
         np.testing.assert_allclose(last * distances**2, near, rtol=0.03)
 
 
+@pytest.mark.long
 def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch):
     """A finer part of a picture shows the same hair system at each pixel as the whole picture, and nothing beside
     it.

@@ -12,7 +12,7 @@ from tests.support.counting import counts_of
 from tests.support.dynamics.following import update
 from tests.support.guide_tools import CHOSEN, SHAPING, TOOLS, grown_from_nothing, lengths_of, select_guides, use_tool
 from tests.support.interface.layout import draw_all, redo_panel
-from tests.support.pairs import pairs
+from tests.support.pairs import pairs, share_of
 from tests.support.reading import points, snapshot
 
 
@@ -63,7 +63,7 @@ def test_other_values_in_the_redo_panel_begin_with_the_guides_as_they_were(waved
     assert all(map(np.array_equal, found, wanted))
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize("name", share_of(TOOLS, 2))
 def test_guides_count_as_combed_and_settings_leave_them_alone(waved, name):
     guides = bpy.data.objects["Guides"].data
     after, _strands = use_tool(name)
@@ -91,7 +91,7 @@ def test_only_selected_guides_change(waved, name, domain, kind):
     assert (every != before).any(axis=(1, 2))[~chosen].any()
 
 
-@pytest.mark.parametrize("name", sorted(set(CHOSEN) & SHAPING.keys()))
+@pytest.mark.parametrize("name", share_of(sorted(set(CHOSEN) & SHAPING.keys()), 2))
 def test_without_a_selection_all_guides_change(waved, name):
     guides = bpy.data.objects["Guides"]
     every, _strands = use_tool(name)
@@ -119,7 +119,7 @@ def test_a_half_selected_guide_changes_by_half(waved):
     np.testing.assert_allclose(lengths_of(after), 0.75 * before, rtol=1e-4)
 
 
-@pytest.mark.parametrize(("name", "mode"), pairs(TOOLS, ["SCULPT_CURVES", "EDIT"], 2))
+@pytest.mark.parametrize(("name", "mode"), pairs(TOOLS, ["SCULPT_CURVES", "EDIT"], 4))
 def test_tools_work_where_artists_select(waved, name, mode):
     outside, _strands = use_tool(name)
     bpy.ops.ed.undo()
@@ -167,7 +167,7 @@ def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
     assert (calls["searches"], calls["writes"]) == (0, 1)
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize("name", share_of(TOOLS, 2))
 def test_undo_in_a_window_keeps_hair_and_guides_together(waved, monkeypatch, name):
     """Undo in a window keeps hair and guides together, although hair is written after the undo step was pushed."""
     monkeypatch.setattr(running, "has_window", lambda: True)

@@ -18,6 +18,7 @@ from tests.support.guide_tools import (
     select_guides,
     use_tool,
 )
+from tests.support.pairs import share_of
 from tests.support.reading import attribute, points, snapshot
 
 
@@ -99,7 +100,7 @@ def evaluated(curves_object):
     return positions.reshape(len(found.curves), -1, 3)
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize("name", share_of(TOOLS, 2))
 def test_hair_follows_on_a_deformed_surface(waved, name):
     modifier = bpy.data.objects["Sphere"].modifiers.new("Bend", "SIMPLE_DEFORM")
     modifier.deform_method, modifier.angle = "BEND", 0.9
@@ -125,7 +126,7 @@ def test_errors_change_nothing(waved):
     assert np.array_equal(points(guides), before) and snapshot() == everything
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize("name", share_of(TOOLS, 2))
 def test_guides_without_a_surface_or_with_broken_points_are_refused(waved, name):
     guides = bpy.data.objects["Guides"]
     broken = points(guides)
@@ -156,7 +157,7 @@ def ragged(imported):
     return imported
 
 
-@pytest.mark.parametrize("name", TOOLS)
+@pytest.mark.parametrize("name", share_of(TOOLS, 2))
 def test_guides_of_any_point_counts(ragged, name):
     counts, firsts = curves.point_counts(ragged.data), curves.first_points(ragged.data)
     before = curves.read_points(ragged.data)

@@ -51,6 +51,7 @@ def shaken(head, guides):
         yield simulation, distances(moved, simulation.vertices()) - kept
 
 
+@pytest.mark.long
 @pytest.mark.gate(id="V12")
 def test_hair_on_a_shaken_head_stays_outside_and_whole(head):
     """No vertex is too near by a micrometer, no segment is 3 % longer, and no strand is reset."""

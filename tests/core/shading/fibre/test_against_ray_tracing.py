@@ -42,7 +42,7 @@ def assert_close(found, expected, where):
     assert np.all(excess[:, where] < 0.0)
 
 
-@pytest.mark.parametrize("degrees", share_of(THETA_D, 2))
+@pytest.mark.parametrize("degrees", share_of(THETA_D, 4))
 def test_texels_are_the_light_that_leaves_through_them(hair, degrees):
     """Texels are the light that leaves through them, also the caustic's in the middle of a row, as both are means."""
     sigma_a, tables = hair

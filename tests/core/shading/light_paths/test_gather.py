@@ -333,6 +333,7 @@ def test_a_sheet_of_strands_lets_as_much_through_as_poisson_says(height):
     assert (ratio(dark) < 1.0).all()
 
 
+@pytest.mark.long
 def test_more_paths_are_taken_where_few_find_light(rng):
     """More paths are taken where few find light, as for a sun behind deep hair; in an even world none is added."""
     grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
@@ -405,6 +406,7 @@ def test_a_surface_is_lit_as_its_normals_say(rng):
     assert (sloping < 0.7 * flat).all() and (sloping > 0.1 * flat).all()
 
 
+@pytest.mark.long
 def test_white_fur_sends_back_what_a_random_walk_finds(rng):
     """White fur on a black floor, 5 strands deep for level light, reflects what a random walk finds."""
     settings = lookup_tables.Settings(

@@ -34,7 +34,7 @@ def lamp(kind, distance, radius, power=1.0):
     return found
 
 
-@pytest.mark.parametrize("kind", share_of([lamps.SUN, lamps.POINT, lamps.AREA], 2))
+@pytest.mark.parametrize("kind", share_of([lamps.SUN, lamps.POINT, lamps.AREA]))
 def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     """A wide lamp lights hair as a world that has the radiance of the lamp's disk in a cone."""
     rough = lookup_tables.Settings(mode="energy", roughness=0.8, radial_roughness=0.8)

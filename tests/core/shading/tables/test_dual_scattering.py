@@ -12,6 +12,7 @@ from hair_addon.core.shading.fibre import azimuthal, marschner, principled
 from hair_addon.core.shading.fibre.angles import FibreAngles
 from hair_addon.core.shading.fibre.pigment import sigma_a_from_melanin
 from hair_addon.core.shading.tables import dual_scattering, lookup_tables
+from tests.support.pairs import share_of
 
 PUBLISHED = {  # melanin: a_f, a_b at normal incidence
     0.220: ((0.624, 0.538, 0.380), (0.173, 0.149, 0.109)),
@@ -231,7 +232,7 @@ def moments(theta, radiance):
     return energy, mean, np.sqrt(np.average((theta - mean) ** 2, weights=weights))
 
 
-@pytest.mark.parametrize("strand_count", [0.0, 3.0])
+@pytest.mark.parametrize("strand_count", share_of([0.0, 3.0], 2))
 def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_count):
     """Lobes have the brightness, width and shift of the tables, tested for R of a black fiber and for the backward
     lobe.
