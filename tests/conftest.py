@@ -13,10 +13,12 @@ from tests.support.devices import DEVICE
 from tools import build_extension, compile_kernels
 
 # Files of few tests that take long. Processes take files one after another: begun last, these would hold up the end.
-LONG_FILES = {
-    *("test_install.py", "test_any_operation.py", "test_kernel_cache.py", "test_compiled_kernels.py"),
-    *("test_sequence.py", "test_interruption.py", "test_api.py", "test_engine.py", "test_history.py"),
-}
+LONG_FILES = (
+    *("test_window.py", "test_window_with_vulkan.py", "test_dynamics.py", "test_composite.py", "test_curly_hair.py"),
+    *("test_first_minutes.py", "test_install.py", "test_any_operation.py", "test_kernel_cache.py"),
+    *("test_compiled_kernels.py", "test_sequence.py", "test_interruption.py", "test_api.py", "test_engine.py"),
+    "test_history.py",
+)
 
 
 def pytest_configure():
@@ -67,7 +69,8 @@ def pytest_collect_directory(path, parent):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Run the files that take longest first, in the same order in all processes."""
-    items.sort(key=lambda item: (item.path.name not in LONG_FILES, item.path))
+    rank = {name: number for number, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: (rank.get(item.path.name, len(rank)), item.path))
 
 
 @pytest.fixture

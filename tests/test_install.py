@@ -109,6 +109,7 @@ def test_bare_python_has_neither_warp_nor_openexr(bare_python):
         assert "ModuleNotFoundError" in found.stderr
 
 
+@pytest.mark.farm
 def test_installs_and_enables(walk):
     assert walk.used["installed"] == {"result": ["FINISHED"], "enabled": True}
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, largest_file, run_here, write_obj
-from tests.support.pairs import pairs
+from tests.support.pairs import pairs, share_of
 
 SMALL = ("--guides", 5, "--strands", 20)
 
@@ -72,7 +72,7 @@ def test_missing_and_unsupported_files_are_refused(tmp_path, verb):
 ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".usdc", ".usda", ".usdz", ".abc"]
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("ending", share_of(ENDINGS, 2))
 def test_a_whole_file_is_read(mesh, ending):
     """Undamaged files are read, so that the refusals of damaged files prove something."""
     path = mesh(f"whole{ending}")
@@ -205,7 +205,11 @@ SLOW = pytest.mark.long  # of formats that go the way of another one
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=SLOW if kind in {".usda", ".usdz"} else ()) for kind in OUTPUTS]
+    "kind",
+    [
+        pytest.param(kind, marks=SLOW if kind in {".usda", ".usdz", ".npz", ".png", "Cycles"} else ())
+        for kind in OUTPUTS
+    ],
 )
 def test_a_full_disk_leaves_nothing_half_written(words, tmp_path, monkeypatch, kind):
     """A full disk leaves no incomplete file; a limit on the size of files, which also ends writing halfway, stands

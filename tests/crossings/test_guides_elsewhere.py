@@ -14,6 +14,7 @@ from hair_addon import api
 from hair_addon.blender.groom.guides import brushes
 from tests.support.commands import TETRAHEDRON, load, run_here, write_obj
 from tests.support.exchange.imported import curves_object, lines_on, select, stored, world
+from tests.support.pairs import share_of
 
 ESSENTIALS = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
 
@@ -67,7 +68,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("ending", FILES)
+@pytest.mark.parametrize("ending", share_of(FILES, 2))
 def test_guides_come_from_a_file(sphere, lines, tmp_path, ending):
     curves_object(lines)
     bpy.ops.wm.obj_export(filepath=str(tmp_path / "sphere.obj"), forward_axis="Y", up_axis="Z")

@@ -19,6 +19,7 @@ from hair_addon.core.long_work import run_now
 from tests.support import file_digest, folder_digest
 from tests.support.exchange.card_meshes import card_object
 from tests.support.exchange.imported import curves_object, lines_on, select
+from tests.support.pairs import share_of_rows
 
 PACKAGE = str(Path(whole_changes.__file__).parents[1])
 # Parts of the calls of an operator, where it fails: for one operator after another.
@@ -215,10 +216,12 @@ CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
 
 
 def cases():
-    """Return each of `CASES` failing at two of its calls; failing at many calls is `long`."""
+    """Return each of `CASES` failing at one or two of its calls; every second case, and many calls, are `long`."""
     for place, case in enumerate(CASES):
         name = f"{case[0]}-{case[1].__name__}"
-        yield pytest.param(*case, FEW_PARTS[place % 2], id=f"{name}-few")
+        yield pytest.param(
+            *case, FEW_PARTS[place // 2 % 2], id=f"{name}-few", marks=() if place % 2 == 0 else pytest.mark.long
+        )
         yield pytest.param(*case, MANY_PARTS, id=f"{name}-many", marks=pytest.mark.long)
 
 
@@ -387,7 +390,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize("name, begin, settings", REFUSED)
+@pytest.mark.parametrize("name, begin, settings", share_of_rows(REFUSED, 2))
 def test_a_refusal_changes_nothing(hair, tmp_path, name, begin, settings):
     FOLDER[:] = [tmp_path]
     begin(np.random.default_rng(1))

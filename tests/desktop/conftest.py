@@ -12,19 +12,6 @@ from tools import build_extension, compile_kernels, desktop_blender
 
 SET_UP = Path(__file__).with_name("set_up.py")
 
-# Files of walks that take longest: begun last, they would hold up the end.
-LONG_FILES = (
-    *("test_window.py", "test_window_with_vulkan.py", "test_dynamics.py", "test_composite.py", "test_curly_hair.py"),
-    "test_first_minutes.py",
-)
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Run the walks that take longest first."""
-    rank = {name: number for number, name in enumerate(LONG_FILES)}
-    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
-
 
 @pytest.fixture(scope="session")
 def desktop():

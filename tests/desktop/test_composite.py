@@ -4,7 +4,6 @@
 import pytest
 
 from tests.desktop import walks
-from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -16,7 +15,7 @@ ROUNDING = 0.5 / 255.0
 PARTS = {"opengl": ("all",), "vulkan": ("renders",)}
 
 
-@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
     """Return the `Walk` with one backend."""
     parts = PARTS[request.param]

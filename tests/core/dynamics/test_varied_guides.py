@@ -13,6 +13,7 @@ from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
 from hair_addon.core.errors import HairError
 from tests.support.devices import DEVICE
 from tests.support.meshes import subdivided_sphere
+from tests.support.pairs import share_of
 
 COUNT, RADIUS, FRAME = 21, 0.1, 1.0 / 24.0  # more guides than lanes of a group
 SETTINGS = DynamicsSettings(vertex_count=11, hair_friction=0.0, hair_pressure=0.0, bend_stiffness=3.0, substeps=4)
@@ -45,7 +46,7 @@ def test_all_settings_that_may_vary_are_tested():
 
 
 @pytest.mark.parametrize("has_ball", [False, True])
-@pytest.mark.parametrize("name", VALUES)
+@pytest.mark.parametrize("name", share_of(VALUES, 2))
 def test_each_guide_moves_with_its_own_setting(name, has_ball):
     """Guides with alternating values have the bits of guides that all have the value; pinned guides up to rounding."""
     is_odd = np.arange(COUNT) % 2 == 1

@@ -77,13 +77,13 @@ def sliders():
 
 
 def cases():
-    """Return each slider on each grooming; one grooming for the first and every third slider of a style is not
+    """Return each slider on each grooming; one grooming for the first and every sixth slider of a style is not
     `long`.
     """
     counts = Counter()
     for place, (settings_class, name) in enumerate(sliders()):
         counts[settings_class] += 1
-        is_quick = counts[settings_class] % 3 == 1
+        is_quick = counts[settings_class] % 6 == 1
         for grooming in range(GROOMINGS):
             marks = () if is_quick and grooming == place % GROOMINGS else pytest.mark.long
             case = f"{settings_class.__module__.rpartition('.')[2]}-{name}-{grooming}"

@@ -4,7 +4,6 @@
 import pytest
 
 from tests.desktop import walks
-from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -14,7 +13,7 @@ FLIPPED = 0.002
 SIZE = (640, 400)  # of the window [pixels]: software drivers take their time for each
 
 
-@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
     """Return the `Walk` with one backend."""
     return walks.take(desktop, "moving/bending", extension, new_profile(), request.param, size=SIZE)

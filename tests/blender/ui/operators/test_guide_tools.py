@@ -16,7 +16,7 @@ from tests.support.pairs import pairs, share_of
 from tests.support.reading import points, snapshot
 
 
-@pytest.mark.parametrize(("name", "active"), pairs(TOOLS, ["Sphere", "Guides", "Hair"]))
+@pytest.mark.parametrize(("name", "active"), pairs(TOOLS, ["Sphere", "Guides", "Hair"], 6))
 def test_hair_follows_whatever_is_active(waved, name, active):
     before, strands = points(bpy.data.objects["Guides"]), points(waved)
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
