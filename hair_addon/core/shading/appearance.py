@@ -105,7 +105,7 @@ class Appearance(Settings):
         0.0, "Amount of water: strands gleam, and the hair darkens", low=0.0, high=1.0, subtype="FACTOR"
     )
     random_color: float = param(
-        0.0, "Random variation of the pigment between strands", low=0.0, high=1.0, subtype="FACTOR"
+        0.0, "Random variation of the pigment between strands", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
     )
     random_roughness: float = param(
         0.0, "Random variation of the roughness between strands", low=0.0, high=1.0, subtype="FACTOR"

@@ -72,7 +72,7 @@ def strand_looks(look: Appearance, varied: Mapping[str, np.ndarray], randoms: np
         return found if name in varied else np.broadcast_to(found, (count, *found.shape))
 
     randoms = np.asarray(randoms, float)
-    deviation = 1.0 + 2.0 * (randoms - 0.5) * look.random_color
+    deviation = 1.0 + 2.0 * (randoms - 0.5) * value("random_color")
     if look.parametrization == "MELANIN":
         melanin = value("melanin")
         # pigment × `pigment_factor` is the pigment of the deviating melanin.

@@ -95,6 +95,25 @@ def test_numbers_are_factors(hair):
     np.testing.assert_allclose([rough.min(), rough.max()], [0.5, 2.0], rtol=1e-6)
 
 
+def test_random_colors_differ_by_place(hair):
+    """A map of *Random Color* gives strands where it is 0 and 1 the colors of grooms with the values at From and To."""
+    sphere, curves = bpy.data.objects["Sphere"], hair.data
+    group = sphere.vertex_groups.new(name="half")
+    group.add([v.index for v in sphere.data.vertices if v.co.x > 0.0], 1.0, "REPLACE")
+    look = curves.vellus.appearance
+    look.random_color = 0.8
+    even, whole = (
+        vary(curves, "look.random_color", kind="STRAND", low=factor, high=factor).root for factor in (0.25, 1.0)
+    )
+    assert np.ptp(whole[:, 0]) > 2.0 * np.ptp(even[:, 0]) > 0.01
+    look.random_color = 0.2
+    np.testing.assert_array_equal(vary(curves, "look.random_color", kind="STRAND", low=1.0, high=1.0).root, even)
+    look.random_color = 0.8
+    found = vary(curves, "look.random_color", kind="GROUP", source="half", low=0.25, high=1.0).root
+    counts = [(found == other).all(axis=1).mean() for other in (even, whole)]
+    assert min(counts) > 0.3 and sum(counts) > 0.7
+
+
 def test_every_source_is_read(coat):
     """Attributes of each domain, the hair's own attributes and random numbers give each strand its value."""
     mesh, curves = bpy.data.objects["Sphere"].data, coat
