@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A map of a number of a style is added by its button in a window, painted, changed by a ramp, undone and redone."""
+
+import pytest
+
+from tests.desktop import walks
+
+pytestmark = pytest.mark.desktop
+
+
+@pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
+def walk(request, desktop, extension, new_profile):
+    """Return the `Walk` with one backend."""
+    return walks.take(desktop, "maps", extension, new_profile(), request.param, size=(760, 540))
+
+
+def test_it_comes_to_its_end(walk):
+    walk.assert_done()
+    assert walk.facts["status"] == "" and walk.complaints() == []
+
+
+def test_the_button_adds_a_map_and_paint_enters_its_mode(walk):
+    assert walk.facts["clicked"] and walk.facts["mode"] == "PAINT_WEIGHT"
+    found = walk.facts["white"]
+    assert found["high where white"] == found["white"] == 400
+
+
+@pytest.mark.parametrize("name", ["painted", "redone", "again"])
+def test_painted_strands_have_their_value(walk, name):
+    """Strands where the map is black and white are those of hair with the values at From and To."""
+    found = walk.facts[name]
+    assert found["low where black"] == found["black"] > 20
+    assert found["high where white"] == found["white"] > 100
+
+
+def test_a_stroke_is_undone_and_redone(walk):
+    assert walk.facts["undone"] == walk.facts["white"] and walk.facts["is redone"]
+
+
+def test_a_ramp_turns_the_values_around_and_is_undone(walk):
+    facts = walk.facts
+    assert facts["same with a ramp"] < 1e-6 and facts["ramps"] == 1
+    assert facts["turned"] == [facts["painted"]["white"], facts["painted"]["black"]]
+    assert facts["is without a ramp"] and facts["ramp undone"] == 0.0
+
+
+def test_strands_are_generated_again_by_the_redo_panel(walk):
+    assert [walk.facts[f"{count} strands"] for count in (300, 400)] == [300, 400]
