@@ -168,14 +168,23 @@ def images_of(target):
 
 
 def follow_images(target, depsgraph):
-    """Mark guides or hair as stale, as their images may have been painted. Roots wait until Texture Paint is left."""
+    """Mark guides or hair as stale if their images were painted. Roots wait until Texture Paint is left.
+
+    Blender also reports images that did not change, as after undo: made again, hair of a surface that was scaled
+    meanwhile would be other hair.
+    """
     state = target.vellus
-    state.is_stale = True
-    if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
+    masking = text_of(state.guides if state.kind == "GUIDES" else state.hair, "density_image")
+    if not masking or target.surface.mode == "TEXTURE_PAINT":
+        state.is_stale = True
         return
+    is_painted = state.status != "" or images_of(target) != {masking}
     with _refusal_as_status(target):
         if staleness.has_other_mask(target, depsgraph):
-            _mark(target)
+            is_painted = True
+            if state.kind == "HAIR":
+                bindings.invalidate(target)
+    state.is_stale = state.is_stale or is_painted
 
 
 def _mapped():
