@@ -18,6 +18,7 @@
 #include "fibre/shown_light.glsl"
 #include "light/light_grid.glsl"
 #include "light/visibility_bytes.glsl"
+#include "light/strand_visibility.glsl"
 #include "visibility/strand_hit.glsl"
 #include "light/world.glsl"
 
@@ -57,15 +58,8 @@ vec3 strand_light(SeenStrand strand)
 {
   vec3 T = strand.T;
   vec3 V = strand.V;
-  vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
-                 vec2(textureSize(visibility_x_y, 0));
-  Seen bytes;
-  bytes.x_y = textureLod(visibility_x_y, seen_at, 0.0);
-  bytes.z = textureLod(visibility_z, seen_at, 0.0);
-  bytes.surface = textureLod(visibility_surface, seen_at, 0.0);
-  bytes.channels = textureLod(visibility_channels, seen_at, 0.0);
-  bytes.color = textureLod(visibility_color, seen_at, 0.0);
-  Seen seen = seen_from_bytes(bytes);
+  vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands);
+  Seen seen = seen_from_bytes(seen_bytes_at(seen_at));
   vec4 seen_x_y = seen.x_y;
   vec4 seen_z = seen.z;
   float strands_behind = mean_strands_behind(seen_x_y, seen_z, view.seen_opacity);

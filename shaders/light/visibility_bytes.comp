@@ -7,7 +7,7 @@
 void main()
 {
   ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(cell, imageSize(seen_x_y)))) {
+  if (any(greaterThanEqual(cell, imageSize(seen_x_y).xy))) {
     return;
   }
   Seen seen;

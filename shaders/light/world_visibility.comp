@@ -19,7 +19,7 @@ vec3 place_of(ivec2 first, int point)
 void main()
 {
   ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(cell, imageSize(seen_x_y)))) {
+  if (any(greaterThanEqual(cell, imageSize(seen_x_y).xy))) {
     return;
   }
   int strand = cell.x / view.seen_points;

@@ -27,17 +27,17 @@ ivec2 seen_texel_of(Corner corner)
   return ivec2(corner.vertex_index % view.row_strands, corner.vertex_index / view.row_strands);
 }
 
-vec3 corner_position(Corner corner)
+vec3 corner_position(Corner corner, mat4 to_world)
 {
-  return (view.object_to_world * vec4(vertex_place(places, corner.vertex_index), 1.0)).xyz;
+  return (to_world * vec4(vertex_place(places, corner.vertex_index), 1.0)).xyz;
 }
 
 // Transforms a normal by the cofactors of the matrix, which also exist for flattened objects. A mirroring matrix turns the
 // other side of triangles to the front, and flips the normals too.
-vec3 corner_world_normal(Corner corner)
+vec3 corner_world_normal(Corner corner, mat4 to_world)
 {
   vec3 normal = vertex_place(normals, corner.normal_index);
-  mat3 matrix = mat3(view.object_to_world);
+  mat3 matrix = mat3(to_world);
   vec3 placed = cross(matrix[1], matrix[2]) * normal.x + cross(matrix[2], matrix[0]) * normal.y +
                 cross(matrix[0], matrix[1]) * normal.z;
   return placed * inversesqrt(max(dot(placed, placed), 1e-30));

@@ -2,6 +2,7 @@
 // Rasterization of strands, one thread for each run of segments. Hair consists of lines about a sample wide, for which this
 // is faster than triangles: GPUs draw triangles in blocks of four samples, and software drivers are slower still.
 
+#include "strands/run_group.glsl"
 #include "visibility/coverage.glsl"
 #include "visibility/segment.glsl"
 #include "visibility/tile.glsl"
@@ -193,7 +194,7 @@ int walked_turn(int walked)
 void walk_run(ivec2 size)
 {
   int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
-  int index = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  int index = group_in_object(group) * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
   int pieces = view.drawn_points - 1;
   int runs = (pieces + RUN_LENGTH - 1) / RUN_LENGTH;
   int turn = walked_turn(index / runs);

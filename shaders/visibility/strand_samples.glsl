@@ -6,6 +6,7 @@
 // vec4 sample_value()
 //     the value of a sample, at the result of `find_place`
 
+#include "strands/placement.glsl"
 #include "visibility/strand_hit.glsl"
 #include "fibre/single_look.glsl"
 
@@ -13,10 +14,10 @@
 // would cost as much as others.
 const int SAMPLES_OF_THREAD = 8;
 
-// Segments of other hair, and NO_SEGMENT, result in numbers beyond this hair's count.
-uint segment_at(ivec2 place)
+// Whether a sample shows this hair; found: the segment's index in its object.
+bool find_hair(ivec2 place, out int found)
 {
-  return texelFetch(segments, place, 0).r - uint(view.first_segment);
+  return find_segment(texelFetch(segments, place, 0).r, found);
 }
 
 void main()
@@ -24,15 +25,14 @@ void main()
   ivec2 size = textureSize(segments, 0);
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, SAMPLES_OF_THREAD) + ivec2(window_left, window_bottom);
   int end = (place.x < size.x) ? min(place.y + SAMPLES_OF_THREAD, size.y) : place.y;
-  uint count = uint(view.strand_count * (view.drawn_points - 1));
+  int found;
   while (true) {
-    while (place.y < end && segment_at(place) >= count) {
+    while (place.y < end && !find_hair(place, found)) {
       place.y++;
     }
     if (place.y >= end) {
       break;
     }
-    int found = int(segment_at(place));
     float share = look_share(found / (view.drawn_points - 1));
     if (share > 0.0) {
       find_place(found, vec2(place) + 0.5, vec2(size));

@@ -44,9 +44,9 @@ SurfacePoint found_point(int triangle, vec2 place, vec2 size, out vec2 depth_ste
   mat3x4 seen_z;
   for (int index = 0; index < 3; index++) {
     Corner corner = corner_at(3 * triangle + index);
-    positions[index] = corner_position(corner);
+    positions[index] = corner_position(corner, view.object_to_world);
     clip[index] = view.world_to_clip * vec4(positions[index], 1.0);
-    corner_normals[index] = corner_world_normal(corner);
+    corner_normals[index] = corner_world_normal(corner, view.object_to_world);
     uvs[index] = corner.uv;
     seen_x_y[index] = texelFetch(visibility_x_y, seen_texel_of(corner), 0);
     seen_z[index] = texelFetch(visibility_z, seen_texel_of(corner), 0);

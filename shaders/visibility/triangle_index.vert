@@ -6,5 +6,5 @@
 void main()
 {
   triangle = first_triangle + gl_VertexID / 3;
-  gl_Position = view.world_to_clip * vec4(corner_position(corner_at(gl_VertexID)), 1.0);
+  gl_Position = view.world_to_clip * vec4(corner_position(corner_at(gl_VertexID), view.object_to_world), 1.0);
 }

@@ -8,8 +8,8 @@ on lights or the view.
 import numpy as np
 
 from ...core.imaging import ambient_cube
-from . import drawing, driver_textures, shadows
-from .programs import scene_programs, seen_programs, uniforms
+from . import drawing, driver_textures, shadows, strand_batches
+from .programs import scene_programs, seen_programs, surface_programs, uniforms
 from .strand_textures import seen_points
 
 # Environment light is soft: its maps are coarser than a lamp's, and drawn with as many strands as they can resolve.
@@ -22,6 +22,8 @@ _FULL_WIDTH = 0.5  # maximum width [texels] of a strand that represents several
 def measure(hair, blockers, opacities, surfaces, forwards=None):
     """Visibility textures {sampler: texture} for each hair and for each surface: two lists.
 
+    Hair objects that share strands share array textures, with a layer for each: `layers`.
+
     hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of strands, one
     for each hair, for which its visibility is computed; that of surfaces is for the densest hair; surfaces:
     [SurfaceOnGPU] that receive light; forwards: (3,) fraction of light that a strand of each hair passes on, None: by
@@ -33,7 +35,11 @@ def measure(hair, blockers, opacities, surfaces, forwards=None):
     lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
     maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))
     maps.draw(lights, hair, blockers, _steps(hair))
-    targets = [_Target(place, not _is_surface(place)) for place in _places(hair, surfaces, of_strands)]
+    layered = _layers_of(hair) + [None] * len(surfaces)
+    targets = [
+        _Target(place, not _is_surface(place), layers)
+        for place, layers in zip(_places(hair, surfaces, of_strands), layered, strict=True)
+    ]
     for target in targets:
         target.add(lights, maps.samplers)
     return _split([target.textures for target in targets], len(hair))
@@ -59,6 +65,7 @@ class Renewal:
         places = _places(hair, surfaces, through)
         if [target.size for target in self._targets] != [_size_of(*place) for place in places]:
             self._targets, self._turn = [_Target(place) for place in places], 0
+        found_layers = layers(hair) + [None] * len(surfaces)
         for target, place in zip(self._targets, places, strict=True):
             target.view, target.places = place
         turn = self._turn
@@ -72,9 +79,42 @@ class Renewal:
             return seen
         self._turn = 0
         complete = [
-            target.completed(textures) for target, textures in zip(self._targets, [*seen[0], *seen[1]], strict=True)
+            target.completed(textures, layer)
+            for target, textures, layer in zip(self._targets, [*seen[0], *seen[1]], found_layers, strict=True)
         ]
         return _split(complete, len(hair))
+
+
+def layers(hair):
+    """Return for each hair its layer in the visibility textures that it shares, None for textures of its own.
+
+    hair: [(StrandsOnGPU, object to world)].
+    """
+    found = [None] * len(hair)
+    for group in _groups(hair):
+        for layer, index in enumerate(group if len(group) > 1 else ()):
+            found[index] = layer
+    return found
+
+
+def _groups(hair):
+    """Return [indices] of hair that shares strands."""
+    return strand_batches.groups_of(id(strands) for strands, _to_world in hair)
+
+
+def _layers_of(hair):
+    """Return for each hair (array textures that it shares, its layer), or None."""
+    found = [None] * len(hair)
+    for group in _groups(hair):
+        if len(group) > 1:
+            strands = hair[group[0]][0]
+            size = strands.row_strands * seen_points(strands.point_count), strands.texture.height
+            shared = {
+                name: _texture(size, seen_programs.BYTES, len(group)) for name in scene_programs.VISIBILITY_SAMPLERS
+            }
+            for layer, index in enumerate(group):
+                found[index] = shared, layer
+    return found
 
 
 def _places(hair, receivers, through):
@@ -138,46 +178,65 @@ def _view_of_surface(surface):
     return view
 
 
+def joined(seen):
+    """Return {sampler: array texture} of linked surfaces, a layer for each of their textures {sampler: texture}."""
+    size = next((texture.width, texture.height) for texture in seen[0].values())
+    found = {name: _texture(size, seen_programs.SUMS, len(seen)) for name in surface_programs.SEEN_SAMPLERS}
+    program = seen_programs.join_program()
+    for layer, textures in enumerate(seen):
+        with drawing.bound(program, {}, {name: textures[name] for name in found}):
+            for name, texture in zip(seen_programs.JOINED, found.values(), strict=True):
+                program.image(name, texture)
+            program.uniform_int("layer", layer)
+            drawing.dispatch_over(program, size, seen_programs.GROUP_SIZE)
+    return found
+
+
 class _Target:
     """Textures in which visibility is summed, a texel for each place.
 
-    is_in_bytes: add all lights at once and store bytes: see shaders/light/visibility_bytes.glsl.
+    is_in_bytes: add all lights at once and store bytes: see shaders/light/visibility_bytes.glsl; in_layer: array
+    textures {sampler: texture} for bytes, and the layer to fill, None for textures of its own.
     """
 
-    def __init__(self, place, is_in_bytes=False):
+    def __init__(self, place, is_in_bytes=False, in_layer=None):
         self.view, self.places = place
         self.size, self._format = _size_of(*place), seen_programs.BYTES if is_in_bytes else seen_programs.SUMS
-        self.take({name: _texture(self.size, self._format) for name in scene_programs.VISIBILITY_SAMPLERS})
+        shared, self._layer = in_layer or (None, None)
+        self.take(shared or {name: _texture(self.size, self._format) for name in scene_programs.VISIBILITY_SAMPLERS})
 
     def take(self, textures):
         """Sum in these textures {sampler: texture}, from zero."""
         self.textures, self._is_first = textures, True
 
-    def completed(self, before):
+    def completed(self, before, layer=None):
         """Return textures {sampler: texture} of the sums, and begin again from zero.
 
-        before: the textures shown so far. Strands' bytes are written into them; for surfaces they take the next sums.
+        before: the textures shown so far, layer: of array textures. Strands' bytes are written into them; for surfaces
+        they take the next sums.
         """
         found = self.textures
         if _is_surface((self.view, self.places)):
             self.take(before)
             return found
-        program = seen_programs.bytes_program()
+        program = seen_programs.bytes_program(layer is not None)
         with drawing.bound(program, {}, found):
-            self._dispatch(program, before)
+            self._dispatch(program, before, layer)
         self.take(found)
         return before
 
     def add(self, lights, maps):
-        program = seen_programs.visibility_program(self._format)
+        program = seen_programs.visibility_program(self._format, self._layer is not None)
         blocks = {"view": uniforms.uniform_buffer(self.view), "lights": uniforms.uniform_buffer(lights)}
         with drawing.bound(program, blocks, {**self.places, **maps}):
             if self._format == seen_programs.SUMS:
                 program.uniform_int("is_first", int(self._is_first))
-            self._dispatch(program, self.textures)
+            self._dispatch(program, self.textures, self._layer)
         self._is_first = False
 
-    def _dispatch(self, program, textures):
+    def _dispatch(self, program, textures, layer):
+        if layer is not None:
+            program.uniform_int("layer", layer)
         for name, texture in zip(seen_programs.IMAGES, textures.values(), strict=True):
             program.image(name, texture)
         drawing.dispatch_over(program, self.size, seen_programs.GROUP_SIZE)
@@ -192,8 +251,8 @@ def _is_surface(place):
     return int(place[0]["point_count"]) == 1
 
 
-def _texture(size, kind):
-    texture = driver_textures.new_texture(size, kind)
+def _texture(size, kind, layer_count=0):
+    texture = driver_textures.new_texture(size, kind, layers=layer_count)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture

@@ -22,11 +22,11 @@ from .strand_textures import bare_vertices, run_for_each, vertex_count
 class Steps:
     """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index.
 
-    thickness: factor of the strands' width.
+    The two numbers may be arrays (N,) for linked hair objects; thickness: factor of the strands' width.
     """
 
-    point_count: int | None = None
-    strand_count: int | None = None
+    point_count: int | np.ndarray | None = None
+    strand_count: int | np.ndarray | None = None
     first_strand: int = 0
     thickness: float = 1.0
 
@@ -90,6 +90,12 @@ def scale_of(object_to_world):
     return abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) ** (1.0 / 3.0)
 
 
+def scales_of(to_world):
+    """Return (N,) `scale_of` of (N, 4, 4) matrices."""
+    (a, b, c), (d, e, f), (g, h, i) = to_world[:, :3, :3].transpose(1, 2, 0)
+    return np.abs(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) ** (1.0 / 3.0)
+
+
 def bounding_sphere(hair):
     """Return (3,) center and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
 
@@ -103,11 +109,9 @@ def bounding_sphere(hair):
     return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
 
 
-def bounding_spheres(hair):
-    """Return (N, 3) centers and (N,) radii [m] of `bounding_sphere` around each hair."""
-    to_world = np.stack([matrix for _strands, matrix in hair])
-    corners = windows.corners_of(np.stack([strands.bounds for strands, _matrix in hair]))
-    corners = corners @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
+def bounding_spheres(strands, to_world):
+    """Return (N, 3) centers and (N,) radii [m] of `bounding_sphere` around `StrandsOnGPU` at (N, 4, 4) places."""
+    corners = windows.corners_of(strands.bounds) @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
     centres = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     return centres, np.maximum(np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1), _LEAST_RADIUS)
 
@@ -126,19 +130,26 @@ def tight_sphere(hair):
 
 def strand_record(strands, view, object_to_world, steps=_ALL):
     """Return a `uniforms.VIEW` record, completed for `StrandsOnGPU` at a place (4, 4)."""
-    record = view.copy()
-    record["object_to_world"] = object_to_world.T
-    record["object_to_clip"] = object_to_world.T @ view["world_to_clip"]  # both transposed
-    record["object_scale"] = scale_of(object_to_world)
-    record["strand_count"], record["point_count"] = strands.strand_count, strands.point_count
-    record["drawn_strands"] = min(strands.strand_count, steps.strand_count or strands.strand_count)
-    record["drawn_points"] = min(strands.point_count, steps.point_count or strands.point_count)
-    record["first_strand"] = steps.first_strand
-    record["part_size"], record["part_stride"] = _parts(strands.strand_count)
-    record["thickness"] = steps.thickness * strands.strand_count / record["drawn_strands"]
-    record["row_strands"] = strands.row_strands
-    record["radius_strands"], record["radius_unit"] = strands.radius_strands, strands.radius_unit
-    return record
+    return strand_records(strands, view, np.asarray(object_to_world)[None], steps)[0]
+
+
+def strand_records(strands, view, to_world, steps=_ALL):
+    """Return (N,) `strand_record`s of `StrandsOnGPU` at places (N, 4, 4); steps: with numbers or arrays (N,)."""
+    records, matrices = np.repeat(view[None], len(to_world)), to_world.transpose(0, 2, 1)
+    records["object_to_world"], records["object_to_clip"] = matrices, matrices @ view["world_to_clip"]
+    records["object_scale"] = scales_of(to_world)
+    records["strand_count"], records["point_count"] = strands.strand_count, strands.point_count
+    for name, wanted, most in (
+        ("drawn_strands", steps.strand_count, strands.strand_count),
+        ("drawn_points", steps.point_count, strands.point_count),
+    ):
+        records[name] = most if wanted is None else np.minimum(wanted, most)
+    records["first_strand"] = steps.first_strand
+    records["part_size"], records["part_stride"] = _parts(strands.strand_count)
+    records["thickness"] = steps.thickness * strands.strand_count / records["drawn_strands"]
+    records["row_strands"] = strands.row_strands
+    records["radius_strands"], records["radius_unit"] = strands.radius_strands, strands.radius_unit
+    return records
 
 
 # Maximum strands in a part: a shader multiplies their number by the stride in 32-bit integers.
@@ -188,7 +199,7 @@ def runs_of_strand(record):
 # The strands that `rasterize_strands` rasterizes, and the denominator of the first share: as in
 # shaders/visibility/rasterize_segment.glsl.
 WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
-_FIRST_SHARE = 8
+FIRST_SHARE = 8
 
 
 def rasterize_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
@@ -199,7 +210,7 @@ def rasterize_strands(strands, program, record, blocks, samplers, images, consta
     `WALK_OTHERS`.
     """
     strand_count = int(record["drawn_strands"])
-    first_count = -(-strand_count // _FIRST_SHARE)
+    first_count = -(-strand_count // FIRST_SHARE)
     walked = (strand_count, first_count, strand_count - first_count)[part]
     if not walked:
         return

@@ -39,61 +39,63 @@ NO_LIMITS = Limits()
 
 
 def steps_of(hair, view):
-    """Return the `drawing.Steps` that suffice for each hair in a view.
+    """Return the `drawing.Steps` that suffice for each hair in a view, with arrays (N,) of its objects.
 
-    hair: [(`StrandsOnGPU`, object to world, `Limits`)]; view: a `uniforms.VIEW` record.
+    hair: [(`StrandsOnGPU`, (N, 4, 4) object to world, `Limits`)]; view: a `uniforms.VIEW` record.
     """
-    if not hair:
-        return []
-    sizes = _sizes_in(view, [(strands, to_world) for strands, to_world, _limits in hair])
-    turn = float(view["coverage_turn"]) % 1.0
-    return [_steps(*one, *size, turn) for one, size in zip(hair, sizes, strict=True)]
+    return [_steps(*one, view) for one in hair]
 
 
-def _steps(strands, to_world, limits, samples_per_unit, diameter, turn):
-    """Return the `drawing.Steps` of a hair; samples_per_unit, diameter: of `_sizes_in`; turn: of the pass."""
+def _steps(strands, to_world, limits, view):
+    """Return the `drawing.Steps` of a hair."""
     count, part = strands.strand_count, limits.part
     if not limits.is_reduced:
         return drawing.Steps(None, max(int(count * part), 1))
-    samples_per_meter = samples_per_unit * drawing.scale_of(to_world)
-    wanted = 2.0 * strands.mean_radius * samples_per_meter / min(_FULL_WIDTH, _WIDTH_PART * diameter)
-    strand_count = int(min(max(count * min(wanted, part), min(_LEAST_STRANDS, count * part)), count))
-    length = strands.mean_length * samples_per_meter
-    pieces = math.ceil(min(length / _PIECE_LENGTH, strands.point_count))
-    point_count = min(max(pieces + 1, _LEAST_POINTS), strands.point_count)
-    if strand_count < count:
-        point_count = min(point_count, _points_that_show(strands, length))
+    samples_per_unit, diameters = _sizes_in(view, strands, to_world)
+    samples_per_meter = samples_per_unit * drawing.scales_of(to_world)
+    wanted = 2.0 * strands.mean_radius * samples_per_meter / np.minimum(_FULL_WIDTH, _WIDTH_PART * diameters)
+    strand_counts = np.maximum(count * np.minimum(wanted, part), min(_LEAST_STRANDS, count * part))
+    strand_counts = np.minimum(strand_counts, count).astype(int)
+    lengths = strands.mean_length * samples_per_meter
+    pieces = np.ceil(np.minimum(lengths / _PIECE_LENGTH, strands.point_count)).astype(int)
+    point_counts = np.minimum(np.maximum(pieces + 1, _LEAST_POINTS), strands.point_count)
+    fewest = np.minimum(point_counts, _points_that_show(strands, lengths))
+    point_counts = np.where(strand_counts < count, fewest, point_counts)
     # With a limit by the artist each pass draws the same strands.
-    first = int(turn * count) if part == 1.0 else 0
-    return drawing.Steps(point_count, max(strand_count, 1), first)
+    first = int(float(view["coverage_turn"]) % 1.0 * count) if part == 1.0 else 0
+    return drawing.Steps(point_counts, np.maximum(strand_counts, 1), first)
 
 
-def _points_that_show(strands, length):
-    """Return the fewest evenly chosen points that show the bends of `StrandsOnGPU`; length: of strands [samples].
+def _points_that_show(strands, lengths):
+    """Return (N,) fewest evenly chosen points that show the bends of `StrandsOnGPU`; lengths: (N,) of strands
+    [samples].
 
     All points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is longer
     than the chord by the fraction 8/3 (s / c)².
     """
-    pieces, enough = strands.point_count - 1, strands.point_count
+    pieces, enough = strands.point_count - 1, np.full(len(lengths), strands.point_count)
+    are_shown = np.ones(len(lengths), bool)
     for step in range(2, pieces // (_LEAST_POINTS - 1) + 1 if strands.has_points else 0):
         if pieces % step:
             continue
         drawn = pieces // step
-        bend = length / drawn * math.sqrt(0.375 * max(strands.lengthening(drawn + 1) - 1.0, 0.0))
-        if not bend <= _GREATEST_BEND:
+        bends = lengths / drawn * math.sqrt(0.375 * max(strands.lengthening(drawn + 1) - 1.0, 0.0))
+        are_shown &= bends <= _GREATEST_BEND
+        enough[are_shown] = drawn + 1
+        if not are_shown.any():
             break
-        enough = drawn + 1
     return enough
 
 
-def _sizes_in(view, placed):
-    """Return [(samples per unit at the nearest strand, diameter [samples])] of [(`StrandsOnGPU`, object to world)].
+def _sizes_in(view, strands, to_world):
+    """Return (N,) samples per unit at the nearest strand and (N,) diameters [samples] of `StrandsOnGPU` at (N, 4, 4)
+    places.
 
     Both are very large if the viewer is inside of the hair's sphere.
     """
-    centres, radii = drawing.bounding_spheres(placed)
-    per_unit = np.full(len(placed), float(view["pixels_per_unit"]))
+    centres, radii = drawing.bounding_spheres(strands, to_world)
+    per_unit = np.full(len(to_world), float(view["pixels_per_unit"]))
     if view["is_perspective"]:
         distances = np.linalg.norm(view["eye"][:3] - centres, axis=1) - radii
-        per_unit = np.divide(per_unit, distances, out=np.full(len(placed), _INSIDE), where=distances > 0.0)
-    return list(zip(per_unit.tolist(), (2.0 * radii * per_unit).tolist(), strict=True))
+        per_unit = np.divide(per_unit, distances, out=np.full(len(to_world), _INSIDE), where=distances > 0.0)
+    return per_unit, 2.0 * radii * per_unit

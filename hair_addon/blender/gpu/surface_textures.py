@@ -15,12 +15,13 @@ from ...core import geometry
 from ...core.imaging.texture_sides import avoid_powers_of_two
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
-from . import drawing
+from . import drawing, driver_textures, strand_batches
 from .programs import surface_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH, bare_vertices
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # maximum per row; each is three texels
 _ROW_CORNERS = TEXTURE_WIDTH - 1  # maximum per row
+_ROW_TRANSFORMS = 250  # per row
 
 surface_cache = Cache(capacity=64)  # session_uid of a mesh object → its last drawn `SurfaceOnGPU`
 
@@ -212,6 +213,49 @@ def draw_depth(surface, view, light_block, fragment=_COLORED, clip_planes=None):
         with drawing.bound(program, blocks, {"places": surface.places}):
             surface.corners.triangles.draw_range(program, elem_start=first, elem_count=count)
         first += count
+
+
+class LinkedSurfaces:
+    """`SurfaceOnGPU`s with the same vertices and corners, drawn together as instances.
+
+    bounds: (2, 3) of vertices, as of each surface; to_world: (N, 4, 4).
+    """
+
+    def __init__(self, surfaces):
+        self._first, self._count = surfaces[0], len(surfaces)
+        self.bounds, self.to_world = self._first.bounds, np.stack([surface.to_world for surface in surfaces])
+        row_count = int(avoid_powers_of_two(-(-self._count // _ROW_TRANSFORMS)))
+        texels = np.zeros((row_count * _ROW_TRANSFORMS, 4, 4), np.float32)
+        texels[: self._count] = self.to_world.transpose(0, 2, 1)
+        self._transforms = driver_textures.new_texture((4 * _ROW_TRANSFORMS, row_count), "RGBA32F", texels)
+
+    def draw_depth(self, view, light_block, fragment, clip_planes=None):
+        """`draw_depth` of all surfaces, for a fragment shader without colors."""
+        program = surface_programs.depth_program(fragment, clip_planes is not None, is_linked=True)
+        blocks = {"view": uniforms.uniform_buffer(view), "lights": light_block}
+        textures = {"places": self._first.places, "transforms": self._transforms}
+        with drawing.bound(program, blocks | uniforms.clipping_blocks(clip_planes), textures):
+            self._first.corners.triangles.draw_instanced(program, instance_start=0, instance_count=self._count)
+
+    def draw_lit(self, program, view, lights, samplers):
+        """`draw_lit` of all surfaces with a program for linked surfaces."""
+        blocks = {"view": uniforms.uniform_buffer(self._first.placed(view)), "lights": uniforms.uniform_buffer(lights)}
+        textures = self._first.samplers | samplers | {"transforms": self._transforms}
+        with drawing.bound(program, blocks, textures):
+            self._first.corners.bare.draw_instanced(program, instance_start=0, instance_count=self._count)
+
+
+def linked(surfaces):
+    """Return [`SurfaceOnGPU` or `LinkedSurfaces`]: surfaces with the same data are joined."""
+    groups = linked_groups(surfaces, [None] * len(surfaces))
+    chosen = [[surfaces[index] for index in group] for group in groups]
+    return [group[0] if len(group) == 1 else LinkedSurfaces(group) for group in chosen]
+
+
+def linked_groups(surfaces, keys):
+    """Return [indices] of surfaces with the same data and equal keys, at most as many as a texture has layers."""
+    data = ((id(surface.places), id(surface.normals), id(surface.corners)) for surface in surfaces)
+    return strand_batches.groups_of(zip(data, keys, strict=True))
 
 
 def draw_lit(surface, program, view, lights, samplers):

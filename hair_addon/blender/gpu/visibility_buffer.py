@@ -13,10 +13,10 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, windows
-from .hair_shading import MixedShading, Shading
+from . import drawing, light_grid, strand_batches, windows
 from .programs import scene_programs, uniforms, visibility_programs
-from .strand_textures import StrandsOnGPU, seen_points
+from .strand_textures import seen_points
+from .surface_shading import white
 
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
@@ -24,36 +24,52 @@ NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 _FEW_SEGMENTS = 1 << 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Placed:
-    """One hair object in a picture, and its range of segments."""
+    """The visible objects of a `strand_batches.Batch` in a picture."""
 
-    strands: StrandsOnGPU
-    shading: Shading | MixedShading
-    record: np.ndarray  # uniforms.VIEW
-    samplers: dict
-    first: int
+    batch: strand_batches.Batch
+    indices: np.ndarray  # (N,) as of the batch
+    records: np.ndarray  # (N,) uniforms.VIEW
     lights: gpu.types.GPUUniformBuf
-    window: tuple  # of `windows`
+    windows: np.ndarray  # (N, 4) of `windows`
+    layers: np.ndarray | None  # (N,) as of the batch
     is_round: bool  # whether any strand is so wide that its bends and ends are visible
+    first_run: int  # number of runs of segments before them
 
     @cached_property
     def view(self):
-        """The record on the GPU."""
-        return uniforms.uniform_buffer(self.record)
+        """The first object's record on the GPU."""
+        return uniforms.uniform_buffer(self.records[0])
+
+    @cached_property
+    def objects(self):
+        """`strand_batches.Objects`; None for a single object with textures of its own."""
+        if self.layers is None:
+            return None
+        return strand_batches.Objects(self.records, self.layers, self.first_run)
 
     @property
-    def is_seen(self):
-        """Whether any part of the picture may show the hair."""
-        return all(self.window[2:])
+    def window(self):
+        """The window around all objects."""
+        low = self.windows[:, :2].min(axis=0)
+        high = (self.windows[:, :2] + self.windows[:, 2:]).max(axis=0)
+        return (*low.tolist(), *(high - low).tolist())
 
     @property
     def segment_count(self):
-        return self.strands.strand_count * (int(self.record["drawn_points"]) - 1)
+        points = self.records["drawn_points"].astype(np.int64)
+        return int((self.records["strand_count"] * (points - 1)).sum())
 
     @property
     def run_count(self):
-        return int(self.record["drawn_strands"]) * drawing.runs_of_strand(self.record)
+        runs_of_strand = -(-(self.records["drawn_points"].astype(np.int64) - 1) // scene_programs.RUN_LENGTH)
+        return int((self.records["drawn_strands"] * runs_of_strand).sum())
+
+    def each(self):
+        """Yield (index of the object's hair, its record on the GPU, its window) for each object."""
+        for index, record, window in zip(self.indices.tolist(), self.records, self.windows.tolist(), strict=True):
+            yield index, uniforms.uniform_buffer(record), window
 
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
@@ -83,6 +99,7 @@ class VisibilityBuffer:
         self._seen_runs = None  # a texel for each run of segments
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
+        self._firsts = self._counts = np.zeros(0, np.int64)  # of the segments of each hair
         self._clip_planes = None  # of `find_hair`
         self._has_strips = False  # whether `depths` only contains strips
         # (format, background) → (framebuffer, texture, framebuffer of `behind_hair`, depth) of additional passes
@@ -151,8 +168,8 @@ class VisibilityBuffer:
             drawing.gpu_state("ALWAYS", depth_writes=True),
             drawing.bound(program, {}, {"segments": self.segments}),
         ):
-            for window in (placed.window for placed in self._hair if placed.is_seen):
-                with windows.drawn_in(window):
+            for placed in self._hair:
+                with windows.drawn_in(placed.window):
                     drawing.cover(program)
 
     def add_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
@@ -168,19 +185,20 @@ class VisibilityBuffer:
     def find_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
         """Fill `segments` and `depths` with the nearest hair in front of surfaces. Raises `HairError`.
 
-        hair: [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene, Steps), ...]; lights, view:
-        records of `uniforms`, lights one for all hair or (H,) for each; in_compute: find the nearest strands by a
-        compute program, None: if supported; clip_planes: (6, 4) of `uniforms.CLIPPING`, None for none.
+        hair: [`strand_batches.Batch`], or [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene,
+        Steps)] of single objects; lights, view: records of `uniforms`, lights one for all hair or (H,) for each;
+        in_compute: find the nearest strands by a compute program, None: if supported; clip_planes: (6, 4) of
+        `uniforms.CLIPPING`, None for none.
         """
         self._clip_planes = clip_planes
         self._hair = self._placed(hair, lights, view)
-        is_refused = bool(self._hair) and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT
+        is_refused = int(self._counts.sum()) > NO_SEGMENT
         if not is_refused and (scene_programs.has_image_atomics() if in_compute is None else in_compute):
             self._find()
             return
         self._clear()
         if is_refused:
-            self._hair = []
+            self._hair, self._firsts, self._counts = [], self._firsts[:0], self._counts[:0]
             raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
         self._draw_strips()
 
@@ -193,22 +211,33 @@ class VisibilityBuffer:
 
     def _placed(self, hair, lights, view):
         """Return [_Placed] from the arguments of `find_hair`."""
-        found, first = [], 0
-        light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
-        placed = [
-            (strands, drawing.strand_record(strands, view, to_world, steps))
-            for strands, _shading, to_world, _samplers, steps in hair
+        batches = [
+            one if isinstance(one, strand_batches.Batch) else strand_batches.single(one, index)
+            for index, one in enumerate(hair)
         ]
-        all_windows = windows.of_strands(placed, self.size)
-        are_round = windows.may_be_wide(placed, self.size, visibility_programs.LEAST_BEND)
-        for index, ((strands, record), (_, shading, _, samplers, _)) in enumerate(zip(placed, hair, strict=True)):
-            record["first_segment"] = first
-            record["seen_points"] = seen_points(strands.point_count)
-            record["seen_opacity"] = shading.opacity
-            record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
-            light_block, place = light_blocks[index if lights.shape else 0], (all_windows[index], are_round[index])
-            found.append(_Placed(strands, shading, record, samplers, first, light_block, *place))
-            first += found[-1].segment_count
+        all_records = [drawing.strand_records(one.strands, view, one.to_world, one.steps) for one in batches]
+        self._counts = np.zeros(sum(len(one.indices) for one in batches), np.int64)
+        for batch, records in zip(batches, all_records, strict=True):
+            pieces = records["drawn_points"].astype(np.int64) - 1
+            self._counts[batch.indices] = batch.strands.strand_count * pieces
+        self._firsts = np.cumsum(self._counts) - self._counts
+        found, run_count, light_block = [], 0, None if lights.shape else uniforms.uniform_buffer(lights)
+        for batch, records in zip(batches, all_records, strict=True):
+            shading = batch.shading
+            records["first_segment"] = self._firsts[batch.indices]
+            records["seen_points"] = seen_points(batch.strands.point_count)
+            records["seen_opacity"] = shading.opacity
+            records["hair_forward"][:, :3], records["hair_reflectance"][:, :3] = shading.forward, shading.reflectance
+            places = windows.of_strands(batch.strands, records, self.size)
+            are_round = windows.may_be_wide(batch.strands, records, self.size, visibility_programs.LEAST_BEND)
+            are_seen = (places[:, 2:] > 0).all(axis=1)
+            if not are_seen.any():
+                continue
+            block = light_block or uniforms.uniform_buffer(lights[batch.indices[0]])
+            layers = None if batch.layers is None else batch.layers[are_seen]
+            seen = batch.indices[are_seen], records[are_seen], block, places[are_seen], layers
+            found.append(_Placed(batch, *seen, bool(are_round[are_seen].any()), run_count))
+            run_count += found[-1].run_count
         return found
 
     def relight(self, hair, lights, view, picture):
@@ -222,7 +251,7 @@ class VisibilityBuffer:
     @property
     def segment_ranges(self):
         """[(first, count)] of the segments of each hair in the last `find_hair`."""
-        return [(placed.first, placed.segment_count) for placed in self._hair]
+        return list(zip(self._firsts.tolist(), self._counts.tolist(), strict=True))
 
     def surfaces_of_part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """Clear and return the framebuffer of surfaces for `part_of_light`, `part_by` and `part`."""
@@ -250,9 +279,12 @@ class VisibilityBuffer:
         inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's.
         """
         texture = self._parts[texture_format, _NOTHING][1]
-        for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
-            blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
-            self._fill(placed, program, texture, blocks, textures)
+        for placed in self._hair:
+            own = {} if placed.layers is None else dict.fromkeys(scene_programs.VISIBILITY_SAMPLERS, white())
+            for index, view, window in placed.each():
+                records, textures = ({}, {}) if inputs is None else inputs[index]
+                blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
+                self._fill(placed, program, texture, {"view": view, **blocks}, own | textures, window)
         return texture
 
     def part_of_light(self, lobes, world):
@@ -271,8 +303,8 @@ class VisibilityBuffer:
         """Index of the last added hair that is nearest in a sample, or None."""
         with self._strips.bind():  # a framebuffer has no size before it is bound
             segment = int(self._strips.read_color(x, y, 1, 1, 1, 0, "UINT")[0][0][0])
-        within = [placed.first <= segment < placed.first + placed.segment_count for placed in self._hair]
-        return within.index(True) if any(within) else None
+        within = (self._firsts <= segment) & (segment < self._firsts + self._counts)
+        return int(np.argmax(within)) if within.any() else None
 
     def hair_near(self, x, y, reach):
         """Index of the hair visible nearest to a sample, at most `reach` samples away, or None."""
@@ -285,9 +317,9 @@ class VisibilityBuffer:
         segments = np.array(read, np.int64).reshape(height, width)
         rows, columns = np.indices(segments.shape)
         away = np.hypot(rows + bottom - y, columns + left - x)
-        found = np.full(segments.shape, -1)
-        for index, placed in enumerate(self._hair):
-            found[(placed.first <= segments) & (segments < placed.first + placed.segment_count)] = index
+        ends = self._firsts + self._counts
+        found = np.searchsorted(ends, segments, side="right")
+        found[segments >= (ends[-1] if len(ends) else 0)] = -1
         away[(found < 0) | (away > reach)] = np.inf
         nearest = np.unravel_index(np.argmin(away), away.shape)
         return int(found[nearest]) if np.isfinite(away[nearest]) else None
@@ -295,11 +327,15 @@ class VisibilityBuffer:
     def _find(self):
         """Find the nearest segments by compute programs: first depths, then indices."""
         self._copy_depths(is_start=True)
-        self._provide_runs(sum(placed.run_count for placed in self._hair if placed.is_seen))
+        self._provide_runs(sum(placed.run_count for placed in self._hair))
         self._is_color_stale = self._has_strips = False
         clipping = uniforms.clipping_blocks(self._clip_planes)
-        all_blocks = [{"view": placed.view, "lights": placed.lights} | clipping for placed in self._hair]
-        if sum(placed.segment_count for placed in self._hair if placed.is_seen) < _FEW_SEGMENTS:
+        names = ["view" if placed.layers is None else "shared_view" for placed in self._hair]
+        all_blocks = [
+            {name: placed.view, "lights": placed.lights} | clipping
+            for name, placed in zip(names, self._hair, strict=True)
+        ]
+        if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
@@ -325,14 +361,17 @@ class VisibilityBuffer:
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
-        samplers, first_run = {"farthest_depths": self._farthest}, 0
+        samplers, constants = {"farthest_depths": self._farthest}, {"are_tiles_known": int(are_tiles_known)}
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
-            if not placed.is_seen:
+            strands, objects = placed.batch.strands, placed.objects
+            kind = is_depth, placed.is_round, self._clip_planes is not None, objects is not None
+            arguments = scene_programs.segments_program(*kind), blocks, samplers, images, constants, part
+            if objects is not None:
+                objects.rasterize(strands, *arguments)
                 continue
-            constants = {"first_run": first_run, "are_tiles_known": int(are_tiles_known)}
-            program = scene_programs.segments_program(is_depth, placed.is_round, self._clip_planes is not None)
-            first_run += placed.run_count
-            drawing.rasterize_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
+            program, *others = arguments
+            others[3] = constants | {"first_run": placed.first_run}
+            drawing.rasterize_strands(strands, program, placed.records[0], *others)
 
     def nearest_depths(self):
         """`depths` of hair, and of surfaces elsewhere."""
@@ -358,8 +397,10 @@ class VisibilityBuffer:
         """Find the nearest segments by drawing triangle strips."""
         program = scene_programs.strip_segments_program(self._clip_planes is not None)
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            for placed in filter(lambda placed: placed.is_seen, self._hair):
-                drawing.draw_strip(placed.strands, program, placed.record, placed.lights, clip_planes=self._clip_planes)
+            for placed in self._hair:
+                for record in placed.records:
+                    arguments = placed.batch.strands, program, record, placed.lights
+                    drawing.draw_strip(*arguments, clip_planes=self._clip_planes)
         self._has_strips = True
 
     def _shade(self, placed, picture, parts=None):
@@ -367,37 +408,39 @@ class VisibilityBuffer:
 
         parts: constants of fibre/drawn_lobes.glsl.
         """
-        for shading, mix in placed.shading.layers:
-            has_options = parts is not None or mix is not None
-            program = shading.program
-            if has_options:
-                program = shading.variant(in_parts=parts is not None, is_mixed=mix is not None)
+        strands, objects = placed.batch.strands, placed.objects
+        for shading, mix in placed.batch.shading.layers:
+            options = {"in_parts": parts is not None, "is_mixed": mix is not None, "is_batch": objects is not None}
+            program = shading.variant(**options) if any(options.values()) else shading.program
             program.bind()
             for name, value in (parts or {}).items():
                 program.uniform_float(name, value)
-            textures, record = dict(shading.samplers), None
+            textures, view = dict(shading.samplers), placed.view
             if shading.is_mapped:
-                textures["strand_looks"] = placed.strands.looks
+                textures["strand_looks"] = strands.looks
             elif shading.is_varied:
-                textures["strand_randoms"] = placed.strands.randoms
+                textures["strand_randoms"] = strands.randoms
             if mix is not None:
                 program.uniform_float("wetness_range", mix.wetness_range)
                 program.uniform_int("is_wet", int(mix.is_wet))
-                textures["strand_wetness"] = placed.strands.wetness
-                record = placed.record.copy()
+                textures["strand_wetness"] = strands.wetness
+                record = placed.records[0].copy()
                 record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
-            self._fill(placed, program, picture, shading.blocks, textures, record)
+                view = uniforms.uniform_buffer(record)
+            if objects is not None:
+                textures["objects"] = objects.texture
+                program.uniform_int("object_count", objects.count)
+                program.uniform_int("last_segment", objects.last_segment)
+            blocks = {"view" if objects is None else "shared_view": view, **shading.blocks}
+            self._fill(placed, program, picture, blocks, textures, placed.window)
 
-    def _fill(self, placed, program, picture, blocks, textures, record=None):
-        """Run a program on the samples in which a hair is nearest; record: replaces the hair's record."""
-        left, bottom, *size = placed.window
-        if not placed.is_seen:
-            return
-        view = placed.view if record is None else uniforms.uniform_buffer(record)
-        blocks = {"view": view, "lights": placed.lights, **blocks}
+    def _fill(self, placed, program, picture, blocks, textures, window):
+        """Run a program on the samples of a window in which a hair is nearest."""
+        left, bottom, *size = window
+        blocks = {"lights": placed.lights, **blocks}
         grid = light_grid.none()
-        textures = {"light_grid": grid, **placed.samplers, **textures}
-        textures |= {"segments": self.segments, **drawing.strand_samplers(placed.strands)}
+        textures = {"light_grid": grid, **placed.batch.samplers, **textures}
+        textures |= {"segments": self.segments, **drawing.strand_samplers(placed.batch.strands)}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
             program.uniform_int("window_left", left)

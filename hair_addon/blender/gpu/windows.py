@@ -21,43 +21,41 @@ def of_box(bounds, to_clip, size, margin=1.0):
 
     to_clip: (4, 4) from the box's coordinates; margin: around the box [samples].
     """
-    clip = _corners_in_clip(bounds[None], np.asarray(to_clip, np.float64)[None])
-    return _around(clip, _are_in_front(clip), size, margin)[0]
+    return tuple(of_boxes(bounds, np.asarray(to_clip, np.float64)[None], size, margin)[0].tolist())
 
 
-def of_strands(placed, size):
-    """Return the windows of [(`StrandsOnGPU`, record of `drawing.strand_record`)], all at once.
+def of_boxes(bounds, to_clip, size, margin=1.0):
+    """Return (N, 4) windows of a box by (N, 4, 4) matrices; the rest as for `of_box`."""
+    clip = _corners_in_clip(bounds, to_clip)
+    return _around(clip, _are_in_front(clip), size, margin)
+
+
+def of_strands(strands, records, size):
+    """Return the windows (N, 4) of `StrandsOnGPU` at the places of (N,) `drawing.strand_records`.
 
     size: of the picture [samples].
     """
-    if not placed:
-        return []
-    records = _records(placed)
-    clip = _corners_in_clip(*_boxes(placed, records))
-    half_width = np.maximum(_half_widths(placed, records, clip), 0.0)
+    clip = _corners_in_clip(strands.bounds, _to_clip(records))
+    half_width = np.maximum(_half_widths(strands, records, clip), 0.0)
     half_width = np.maximum(half_width, records["least_half_width"] * records["pixels_per_unit"])
     # A strip is up to √2 wider along an axis of the picture than across its own axis; samples are jittered.
     return _around(clip, _are_in_front(clip), size, 1.5 * half_width + 1.0 + 0.5 * records["sample_offset"])
 
 
-def may_be_wide(placed, size, half_width):
-    """Return whether any strand may reach a half width [samples] in a picture, for each of `placed`.
-
-    placed, size: as for `of_strands`.
+def may_be_wide(strands, records, size, half_width):
+    """Return (N,) bool: whether any strand may reach a half width [samples] in a picture; arguments as for
+    `of_strands`.
     """
-    if not placed:
-        return []
-    records = _records(placed)
-    bounds, to_clip = _boxes(placed, records)
-    clip = _corners_in_clip(bounds, to_clip)
+    to_clip = _to_clip(records)
+    clip = _corners_in_clip(strands.bounds, to_clip)
     # `width_stretch` of shaders/visibility/segment.glsl at the picture's corner farthest from its axis.
     forward = np.where(records["is_perspective"][:, None] != 0, to_clip[:, 3, :3], [0.0, 0.0, 1.0])
     axis = (to_clip[:, :, :3] @ forward[..., None])[..., 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         beside = np.maximum(np.abs(axis[:, :2] / axis[:, 3:]) + 1.0, 2.0) * 0.5 * np.array(size)
         stretch = (1.0 + (beside**2).sum(axis=1) / records["pixels_per_unit"].astype(np.float64) ** 2) ** 0.5
-    widths = np.where(records["is_perspective"] != 0, stretch, 1.0) * _half_widths(placed, records, clip)
-    return (~_are_in_front(clip) | (widths >= half_width)).tolist()
+    widths = np.where(records["is_perspective"] != 0, stretch, 1.0) * _half_widths(strands, records, clip)
+    return ~_are_in_front(clip) | (widths >= half_width)
 
 
 @contextmanager
@@ -70,34 +68,24 @@ def drawn_in(window):
 
 
 def _around(clip, are_in_front, size, margin):
-    """Return the windows around (N, 4, 8) corners in clip space; the whole picture for boxes behind the viewer."""
+    """Return (N, 4) windows around (N, 4, 8) corners in clip space; the whole picture for boxes behind the viewer."""
     w = np.where(are_in_front[:, None, None], clip[:, 3:], 1.0)
     places = (0.5 * clip[:, :2] / w + 0.5) * np.array(size)[:, None]
     margin = np.broadcast_to(margin, len(clip))[:, None]
     low = np.clip(np.floor(places.min(axis=2) - margin), 0, size).astype(int)
     high = np.clip(np.ceil(places.max(axis=2) + margin), 0, size).astype(int)
-    found = np.where(are_in_front[:, None], np.append(low, high - low, axis=1), (0, 0, *size))
-    return list(map(tuple, found.tolist()))
+    return np.where(are_in_front[:, None], np.append(low, high - low, axis=1), (0, 0, *size))
 
 
-def _records(placed):
-    """Return the records of [(`StrandsOnGPU`, record)] as an array: NumPy's `stack` takes twenty times longer."""
-    records = np.empty(len(placed), placed[0][1].dtype)
-    for index, (_strands, record) in enumerate(placed):
-        records[index] = record
-    return records
-
-
-def _boxes(placed, records):
-    """Return (N, 2, 3) bounds and (N, 4, 4) matrices to clip space of [(`StrandsOnGPU`, record)]."""
-    bounds = np.stack([strands.bounds for strands, _record in placed])
-    return bounds, records["object_to_clip"].transpose(0, 2, 1).astype(np.float64)
+def _to_clip(records):
+    """Return (N, 4, 4) matrices to clip space of records."""
+    return records["object_to_clip"].transpose(0, 2, 1).astype(np.float64)
 
 
 def _corners_in_clip(bounds, to_clip):
-    """Return (N, 4, 8) corners of (N, 2, 3) boxes in clip space."""
+    """Return (N, 4, 8) corners of a (2, 3) box in clip space, by (N, 4, 4) matrices."""
     corners = corners_of(bounds)
-    return to_clip @ np.append(corners, np.ones((*corners.shape[:-1], 1)), axis=-1).transpose(0, 2, 1)
+    return to_clip @ np.append(corners, np.ones((8, 1)), axis=1).T
 
 
 def _are_in_front(clip):
@@ -105,9 +93,8 @@ def _are_in_front(clip):
     return ((clip[:, 2] + clip[:, 3]).min(axis=1) > 0.0) & (clip[:, 3].min(axis=1) > 0.0)
 
 
-def _half_widths(placed, records, clip):
+def _half_widths(strands, records, clip):
     """Return the greatest half width [samples] of each hair on the picture's axis; infinite behind the viewer."""
     scale = records["object_scale"].astype(np.float64) * records["thickness"] * records["pixels_per_unit"]
     w = clip[:, 3].min(axis=1)
-    radii = np.array([strands.greatest_radius for strands, _record in placed])
-    return np.divide(scale * radii, w, out=np.full(len(w), np.inf), where=w > 0.0)
+    return np.divide(scale * strands.greatest_radius, w, out=np.full(len(w), np.inf), where=w > 0.0)

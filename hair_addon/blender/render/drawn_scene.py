@@ -15,16 +15,17 @@ from ..gpu import (
     drawing,
     level_of_detail,
     scene_lights,
+    strand_batches,
     strand_textures,
     studio_lights,
     surface_textures,
     windows,
 )
 from ..gpu import lights as blender_lights
-from ..gpu.programs import uniforms
+from ..gpu.programs import surface_programs, uniforms
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import gpu_strands, hair_cache, hair_places, modified_hair, read_strands, solid_hair
+from . import gpu_strands, hair_cache, hair_places, modified_hair, motion_vectors, read_strands, solid_hair
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -61,6 +62,63 @@ class DrawnScene:
     surface_lights: np.ndarray | None = None  # the same for `surfaces`, then for `clear`
     mist: Mist = WITHOUT_WORLD  # in renders
     root_uvs: tuple = ()  # texture of each hair, or None without UVs, if a pass needs them
+
+    @cached_property
+    def batches(self):
+        """[`strand_batches.Batch`] of all hair, without the steps and shadow maps of a view: linked hair is drawn at
+        once.
+        """
+        layers = ambient_visibility.layers(_placed(self.hair))
+        keys = [self._key(index) for index in range(len(self.hair))]
+        found = []
+        for indices in strand_batches.groups_of(keys):
+            strands, shading, _to_world, _limits = self.hair[indices[0]]
+            to_world = np.stack([self.hair[index][2] for index in indices])
+            own = None if layers[indices[0]] is None else np.array([layers[index] for index in indices])
+            samplers = self.hair_visibility[indices[0]]
+            found.append(strand_batches.Batch(strands, shading, to_world, np.array(indices), own, samplers))
+        return found
+
+    def _key(self, index):
+        """Return a key that is equal for hair in the same batch."""
+        strands, shading, _to_world, limits = self.hair[index]
+        textures = tuple(map(id, self.hair_visibility[index].values()))
+        lights = None if self.hair_lights is None else self.hair_lights[index].tobytes()
+        return id(strands), id(shading), limits, textures, lights
+
+    @cached_property
+    def occluders(self):
+        """`surfaces` for drawing of depth alone, from `surface_textures.linked`."""
+        return surface_textures.linked([surface for surface, _parts in self.surfaces])
+
+    @cached_property
+    def shadowed(self):
+        """[(`SurfaceOnGPU` or `LinkedSurfaces`, their `uniforms.LIGHTS`, {sampler: texture} of the world's visibility,
+        whether hair darkens them)] of `surfaces` in a viewport: linked surfaces are drawn at once.
+        """
+        surfaces, count = [surface for surface, _parts in self.surfaces], len(self.surfaces)
+        lights = [self.lights] * count if self.surface_lights is None else self.surface_lights[:count]
+        are_shadowed = self.is_shadowed or (True,) * count
+        keys = [(record.tobytes(), is_dark) for record, is_dark in zip(lights, are_shadowed, strict=True)]
+        found = []
+        for group in surface_textures.linked_groups(surfaces, keys):
+            chosen, seen = [surfaces[index] for index in group], [self.surface_visibility[index] for index in group]
+            is_single, first = len(group) == 1, group[0]
+            surface = chosen[0] if is_single else surface_textures.LinkedSurfaces(chosen)
+            own = {name: seen[0][name] for name in surface_programs.SEEN_SAMPLERS}
+            own = own if is_single or not are_shadowed[first] else ambient_visibility.joined(seen)
+            found.append((surface, lights[first], own, are_shadowed[first]))
+        return found
+
+    @cached_property
+    def looks(self):
+        """`Shading`s of all hair: both layers of hair that is wet in places, as their mix may change."""
+        return tuple(layer for _strands, shading, *_ in self.hair for layer, _mix in shading.layers)
+
+    @cached_property
+    def places(self):
+        """`motion_vectors.places_of` hair and surfaces."""
+        return motion_vectors.places_of(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,9 +379,9 @@ def _upload(meshes, is_shaded, has_paths):
 
     is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
     """
-    uploaded, blockers = {False: [], True: []}, []
+    uploaded, blockers, twins = {False: [], True: []}, [], {}
     for mesh in meshes:
-        is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh)
+        is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh, twins)
         if mesh.is_seen:
             places = scene_lights.places_on_surface(mesh.vertices, mesh.triangles, mesh.to_world)
             receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
@@ -340,22 +398,28 @@ def _upload(meshes, is_shaded, has_paths):
     }
 
 
-def _on_gpu(mesh):
-    """Return the `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused."""
+def _on_gpu(mesh, twins):
+    """Return the `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused.
+
+    twins: {shape: `SurfaceOnGPU`} of this scene, updated here: linked objects share its data.
+    """
     key, cache = (mesh.owner[0], mesh.is_clear), surface_textures.surface_cache
-    return cache.keep(
-        key,
-        surface_textures.upload_surface(
-            mesh.vertices,
-            mesh.triangles,
-            mesh.normals,
-            mesh.has_vertex_normals,
-            mesh.uvs,
-            mesh.colors,
-            mesh.to_world,
-            cache.get(key),
-        ),
+    shape, known = (len(mesh.vertices), len(mesh.triangles)), cache.get(key)
+    twin = twins.get(shape)
+    if twin is not None and (known is None or known.places is not twin.places):
+        known = twin if np.array_equal(mesh.vertices, twin.vertices) else known
+    surface = surface_textures.upload_surface(
+        mesh.vertices,
+        mesh.triangles,
+        mesh.normals,
+        mesh.has_vertex_normals,
+        mesh.uvs,
+        mesh.colors,
+        mesh.to_world,
+        known,
     )
+    twins.setdefault(shape, surface)
+    return cache.keep(key, surface)
 
 
 def _placed(hair):
@@ -466,5 +530,6 @@ def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
 def _have_same_places(drawn, other):
     """Whether the visibility textures of a `DrawnScene` fit the hair and surfaces of another."""
     sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many.hair] for many in (drawn, other))
+    layers, other_layers = (ambient_visibility.layers(_placed(many.hair)) for many in (drawn, other))
     corners, other_corners = ([surface.vertex_count for surface in _receiving(many)] for many in (drawn, other))
-    return sizes == others and corners == other_corners
+    return (sizes, layers, corners) == (others, other_layers, other_corners)

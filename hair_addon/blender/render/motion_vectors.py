@@ -25,20 +25,23 @@ class Places:
 
     def has_still_hair(self, others):
         """Whether all hair is unmoved relative to other `Places`, regardless of the camera."""
-        return self.hair.keys() == others.hair.keys() and all(
-            _is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items()
+        return self.hair is others.hair or (
+            self.hair.keys() == others.hair.keys()
+            and all(_is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items())
         )
 
     def has_same_strands(self, others):
         """Whether all hair has the same numbers of strands and points as in other `Places`."""
-        return self.hair.keys() == others.hair.keys() and all(
-            place[1] == others.hair[owner][1] for owner, place in self.hair.items()
+        return self.hair is others.hair or (
+            self.hair.keys() == others.hair.keys()
+            and all(place[1] == others.hair[owner][1] for owner, place in self.hair.items())
         )
 
     def has_still_surfaces(self, others):
         """Whether all surfaces are unmoved relative to other `Places`."""
-        return self.surfaces.keys() == others.surfaces.keys() and all(
-            place[2] == others.surfaces[owner][2] for owner, place in self.surfaces.items()
+        return self.surfaces is others.surfaces or (
+            self.surfaces.keys() == others.surfaces.keys()
+            and all(place[2] == others.surfaces[owner][2] for owner, place in self.surfaces.items())
         )
 
 
@@ -114,6 +117,11 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
 
 def places(drawn, world_to_view, view_to_clip):
     """Return the `Places` of a `DrawnScene`, which may be read without lighting."""
+    return Places(view_to_clip @ world_to_view, *drawn.places)
+
+
+def places_of(drawn):
+    """Return (hair, surfaces) of `Places` of a `DrawnScene`."""
     hair = {
         owner: (strands.texture, (strands.strand_count, strands.point_count), to_world, strands.moved)
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _unique(drawn.owners), strict=True)
@@ -122,7 +130,7 @@ def places(drawn, world_to_view, view_to_clip):
         owner: (surface.places, surface.shape, surface.fingerprint, surface.to_world)
         for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True)
     }
-    return Places(view_to_clip @ world_to_view, hair, surfaces)
+    return hair, surfaces
 
 
 def _unique(owners):

@@ -16,8 +16,16 @@ def draw_hiding(drawn, view, clip_planes=None):
     """
     light_block = uniforms.uniform_buffer(drawn.lights)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, _parts in drawn.surfaces:
-            surface_textures.draw_depth(surface, view, light_block, _OCCLUDING, clip_planes)
+        for surface in drawn.occluders:
+            _draw_depth(surface, view, light_block, clip_planes)
+
+
+def _draw_depth(surface, view, light_block, clip_planes=None):
+    """Draw the depth of a `SurfaceOnGPU` or `LinkedSurfaces`."""
+    if isinstance(surface, surface_textures.LinkedSurfaces):
+        surface.draw_depth(view, light_block, _OCCLUDING, clip_planes)
+    else:
+        surface_textures.draw_depth(surface, view, light_block, _OCCLUDING, clip_planes)
 
 
 def draw(drawn, view, buffer, is_transparent):
@@ -80,7 +88,8 @@ def find_hair(drawn, view, buffer, chosen=None, clip_planes=None):
     chosen: indices of the hair, None for all; clip_planes: as for `draw_hiding`.
     """
     hair = _hair_in_view(drawn, view, is_viewport=True)
-    hair = hair if chosen is None else [hair[index] for index in chosen]
+    if chosen is not None:
+        hair = [part for batch in hair if len((part := batch.part(list(chosen))).indices)]
     buffer.find_hair(hair, drawn.lights, view, clip_planes=clip_planes)
 
 
@@ -93,16 +102,18 @@ def _hair_lights(drawn):
 
 
 def _hair_in_view(drawn, view, is_viewport):
-    all_steps = [drawing.Steps()] * len(drawn.hair)
+    """Return [`strand_batches.Batch`] of all hair with the steps of a view."""
+    all_steps = [drawing.Steps()] * len(drawn.batches)
     if is_viewport:
-        all_steps = level_of_detail.steps_of([(strands, *place) for strands, _shading, *place in drawn.hair], view)
-    hair = []
-    for one, seen, steps in zip(drawn.hair, drawn.hair_visibility, all_steps, strict=True):
-        strands, shading, to_world, _limits = one
-        if drawn.is_wire:
-            steps = replace(steps, thickness=_WIRE_THICKNESS)
-        hair.append((strands, shading, to_world, drawn.shadow_maps.samplers | seen, steps))
-    return hair
+        limits = [drawn.hair[batch.indices[0]][3] for batch in drawn.batches]
+        placed = zip(drawn.batches, limits, strict=True)
+        all_steps = level_of_detail.steps_of([(one.strands, one.to_world, limit) for one, limit in placed], view)
+    if drawn.is_wire:
+        all_steps = [replace(steps, thickness=_WIRE_THICKNESS) for steps in all_steps]
+    return [
+        replace(batch, samplers=drawn.shadow_maps.samplers | batch.samplers, steps=steps)
+        for batch, steps in zip(drawn.batches, all_steps, strict=True)
+    ]
 
 
 def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
@@ -141,9 +152,20 @@ def draw_hair_shadow(drawn, view, buffer):
 
 def draw_viewport_shadow(drawn, view):
     """Like `draw_hiding`, with black over Blender's drawing, whose alpha is the fraction of light that hair blocks."""
-    is_left_out = [not is_shadowed for is_shadowed in drawn.is_shadowed] or None
+    _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "shadows/hair_shadow_view.frag", is_left_out)
+        for surface, lights, seen, is_shadowed in drawn.shadowed:
+            samplers, is_linked = (
+                drawn.shadow_maps.samplers | seen,
+                isinstance(surface, surface_textures.LinkedSurfaces),
+            )
+            program = surface_programs.arrival_program("shadows/hair_shadow_view.frag", is_linked)
+            if not is_shadowed:
+                _draw_depth(surface, view, uniforms.uniform_buffer(lights))
+            elif is_linked:
+                surface.draw_lit(program, view, lights, samplers)
+            else:
+                surface_textures.draw_lit(surface, program, view, lights, samplers)
 
 
 def _draw_by_lights(drawn, view, fragment, is_left_out=None):
@@ -177,7 +199,7 @@ def light_of(drawn, solid):
 def _see_through_hair(drawn, view):
     """Write the hair with most strands into a view record, as a draw call has a single color of hair's shadow."""
     if drawn.hair:
-        shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
+        shading = drawn.batches[ambient_visibility.densest([batch.strands for batch in drawn.batches])].shading
         view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
         view["hair_reflectance"][:3] = shading.reflectance
 

@@ -114,11 +114,11 @@ def main():
     picture = hair_picture.HairPicture(size, 2)
     cameras = [camera_of(middle, options.distance * width, TURN * turn, size) for turn in range(FRAMES)]
     picture.add_pass(drawn, *cameras[0])  # compiles
-    placed = [(strands, to_world, limits) for strands, _shading, to_world, limits in drawn.hair]
+    placed = [(batch.strands, batch.to_world, drawn.hair[batch.indices[0]][3]) for batch in drawn.batches]
     steps = level_of_detail.steps_of(placed, picture._view)
-    strand_count = sum(one.strand_count for one in steps)
-    segments = sum(one.strand_count * ((one.point_count or 41) - 1) for one in steps)
-    print(f"{strand_count / len(steps):.0f} strands a head, {segments / 1e6:.1f} million segments a pass")
+    strand_count = sum(int(np.sum(one.strand_count)) for one in steps)
+    segments = sum(int(np.sum(one.strand_count * (one.point_count - 1))) for one in steps)
+    print(f"{strand_count / len(drawn.hair):.0f} strands a head, {segments / 1e6:.1f} million segments a pass")
     if options.host:
         gpu.compute.dispatch = lambda *_given: None
     turning, resting = Times(not options.host), Times(not options.host)

@@ -32,7 +32,9 @@ def steps_from(strands, distance, part=1.0, coverage_turn=0.0, is_reduced=True):
 
 
 def steps_of(strands, view, to_world=IDENTITY, limits=level_of_detail.NO_LIMITS):
-    return level_of_detail.steps_of([(strands, to_world, limits)], view)[0]
+    (steps,) = level_of_detail.steps_of([(strands, to_world[None], limits)], view)
+    points, count = (one if one is None else int(np.ravel(one)[0]) for one in (steps.point_count, steps.strand_count))
+    return drawing.Steps(points, count, steps.first_strand)
 
 
 @pytest.fixture

@@ -237,8 +237,8 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
             strand_textures.upload_strands(points, radii),
             drawing.pass_record(np.eye(4), view_to_clip, SIZE),
         )
-        record = drawing.strand_record(on_gpu, view, to_world)
-        ((left, bottom, width, height),) = windows.of_strands([(on_gpu, record)], SIZE)
+        records = drawing.strand_records(on_gpu, view, to_world[None])
+        ((left, bottom, width, height),) = windows.of_strands(on_gpu, records, SIZE)
         assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()
         assert width * height < 0.5 * SIZE[0] * SIZE[1]
 
@@ -280,9 +280,9 @@ def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(sh
         to_world = np.diag([0.15, 0.1, 0.1, 1.0])
         to_world[:3, 3] = x, 0.0, -0.6
         placed, found = [(points, radii, to_world)], []
-        monkeypatch.setattr(windows, "may_be_wide", lambda *given: chosen.extend(may_be_wide(*given)) or chosen[-1:])
+        monkeypatch.setattr(windows, "may_be_wide", lambda *given: chosen.append(may_be_wide(*given)) or chosen[-1])
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
-        monkeypatch.setattr(windows, "may_be_wide", lambda *_given: [True])
+        monkeypatch.setattr(windows, "may_be_wide", lambda *_given: np.array([True]))
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
         for chosen_program, whole_program in zip(*found, strict=True):
             np.testing.assert_array_equal(chosen_program, whole_program)

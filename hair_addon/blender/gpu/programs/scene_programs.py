@@ -18,22 +18,34 @@ VISIBILITY_SAMPLERS = (
 STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/visibility/segment.glsl
 
 
-def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
-    """Declare the inputs of all scene shaders: camera, lights, shadow maps, world lighting."""
+# Linked hair objects are drawn together: see shaders/strands/batch_object.glsl.
+_BATCH_FIRST = "strands/batch_object.glsl"
+_BATCH_REPLACED = {
+    "strands/placement.glsl": "strands/batch_placement.glsl",
+    "strands/run_group.glsl": "strands/batch_run_group.glsl",
+    "light/strand_visibility.glsl": "light/layer_visibility.glsl",
+}
+_BATCH_SAMPLER = ("objects", "FLOAT_2D")
+
+
+def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True, is_batch=False):
+    """Declare the inputs of all scene shaders: camera, lights, shadow maps, world lighting; is_batch: for linked hair
+    objects.
+    """
     info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
-    info.uniform_buf(0, "View", "view")
+    info.uniform_buf(0, "View", "shared_view" if is_batch else "view")
     info.uniform_buf(1, "Lights", "lights")
     for slot, name in enumerate(shadow_samplers):
         info.sampler(slot, "FLOAT_2D_ARRAY", name)
     if is_lit:
         for slot, name in enumerate(VISIBILITY_SAMPLERS, start=len(SHADOW_SAMPLERS)):
-            info.sampler(slot, "FLOAT_2D", name)
+            info.sampler(slot, "FLOAT_2D_ARRAY" if is_batch else "FLOAT_2D", name)
 
 
-def declare_clipped_scene(info, shadow_samplers, is_clipped):
+def declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch=False):
     """`declare_scene` without the world's lighting; returns the includes that clipping replaces."""
     structs = uniforms.CLIPPING.source if is_clipped else ""
-    declare_scene(info, structs, shadow_samplers, is_lit=False)
+    declare_scene(info, structs, shadow_samplers, is_lit=False, is_batch=is_batch)
     if not is_clipped:
         return {}
     info.uniform_buf(2, "Clipping", "clipping")
@@ -103,13 +115,17 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_
 
 
 @cached
-def segments_program(is_depth, is_round, is_clipped=False):
-    """Return the compute program that draws strands as samples of a picture: see visibility/strand_segments.comp."""
-    images, constants = ("depths", "segments", "seen_runs"), ("first_run", "are_tiles_known")
+def segments_program(is_depth, is_round, is_clipped=False, is_batch=False):
+    """Return the compute program that draws strands as samples of a picture: see visibility/strand_segments.comp.
+
+    is_batch: of linked hair objects.
+    """
+    images, constants = ("depths", "segments", "seen_runs"), ("are_tiles_known",)
     defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
-    return _walk(
-        "visibility/strand_segments.comp", images, defined, constants, samplers=samplers, is_clipped=is_clipped
-    )
+    options = {"samplers": samplers, "is_clipped": is_clipped, "is_batch": is_batch}
+    if not is_batch:
+        constants = ("first_run", *constants)
+    return _walk("visibility/strand_segments.comp", images, defined, constants, **options)
 
 
 @cached
@@ -120,11 +136,13 @@ def strand_shadow_program(is_front):
     return _walk("shadows/strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
 
 
-def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False):
+def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False, is_batch=False):
     info = gpu.types.GPUShaderCreateInfo()
     for name, value in defined.items():
         info.define(name, str(value).lower())
-    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped)
+    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch)
+    if is_batch:
+        samplers, constants = (*samplers, _BATCH_SAMPLER), (*constants, "object_count")
     info.local_group_size(RUN_GROUP_SIZE)
     own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
     for slot, (name, kind) in enumerate((*own, *samplers), start=len(SHADOW_SAMPLERS)):
@@ -133,7 +151,13 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), 
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     for name in (*constants, "walked_part"):
         info.push_constant("INT", name)
-    return compile_compute(info, file, replaced)
+    return _compile(info, file, replaced, is_batch)
+
+
+def _compile(info, file, replaced, is_batch):
+    if not is_batch:
+        return compile_compute(info, file, replaced)
+    return compile_compute(info, file, replaced | _BATCH_REPLACED, first=_BATCH_FIRST)
 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
@@ -142,13 +166,16 @@ SAMPLES_OF_THREAD = 8  # SAMPLES_OF_THREAD of shaders/visibility/strand_samples.
 
 
 @cached
-def shading_program(file, blocks=(), tables=(), is_mapped=False, in_parts=False, is_mixed=False, is_solid=False):
+def shading_program(
+    file, blocks=(), tables=(), is_mapped=False, in_parts=False, is_mixed=False, is_solid=False, is_batch=False
+):
     """Return the compute program that shades strands with a model's .comp.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; is_mapped: each strand has a look of its
     own, in the sampler of fibre/mapped_strand.glsl; in_parts: draw a part of the light,
     selected by the constants of fibre/drawn_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
-    of fibre/mixed_looks.glsl; is_solid: for Solid shading, by the block of fibre/solid_light.glsl.
+    of fibre/mixed_looks.glsl; is_solid: for Solid shading, by the block of fibre/solid_light.glsl; is_batch: of linked
+    hair objects.
     """
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
     structs_source = "".join(block.source for block in structs)
@@ -156,7 +183,7 @@ def shading_program(file, blocks=(), tables=(), is_mapped=False, in_parts=False,
     if is_solid:
         samplers = (*samplers, ("strand_tints", "FLOAT_2D"), ("matcap", "FLOAT_2D"))
         structs_source += uniforms.SOLID.source
-    info = strand_samples_info(structs_source, samplers, is_mixed=is_mixed)
+    info = strand_samples_info(structs_source, samplers, is_mixed=is_mixed, is_batch=is_batch)
     for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
         info.uniform_buf(slot, block.type_name, instance)
     replaced = {}
@@ -174,25 +201,26 @@ def shading_program(file, blocks=(), tables=(), is_mapped=False, in_parts=False,
         replaced["fibre/single_look.glsl"] = "fibre/mixed_looks.glsl"
         info.push_constant("VEC2", "wetness_range")
         info.push_constant("INT", "is_wet")
-    return compile_compute(info, file, replaced)
+    return _compile(info, file, replaced, is_batch)
 
 
-def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False):
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False, is_batch=False):
     """Info of a program that includes visibility/strand_samples.glsl.
 
     samplers: (name, type), ... besides the scene's; texture_format: of the image that it fills; is_mixed: whether it
-    also reads the image.
+    also reads the image; is_batch: of linked hair objects.
     """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
-    declare_scene(info, structs)
+    declare_scene(info, structs, is_batch=is_batch)
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
+    samplers = (*samplers, _BATCH_SAMPLER) if is_batch else samplers
     own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
     read = (("segments", "UINT_2D"), *own, ("light_grid", "FLOAT_3D"), *samplers)
     for slot, (name, kind) in enumerate(read, start=first):
         info.sampler(slot, kind, name)
     info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
-    for name in ("window_left", "window_bottom"):
+    for name in ("window_left", "window_bottom", *(("object_count", "last_segment") if is_batch else ())):
         info.push_constant("INT", name)
     return info
 

@@ -19,10 +19,11 @@ STRAND_FOLDERS = tuple(Path(package.__file__).parent for package in (interpolati
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
-def expand(name, replaced=None, texts=None):
+def expand(name, replaced=None, texts=None, first=None):
     """Return (text, lines): the text of a file with every #include expanded once, and each line's (file, number).
 
-    replaced: {file: the file to include instead, or None for nothing}; texts: {file: text} of generated files.
+    replaced: {file: the file to include instead, or None for nothing}; texts: {file: text} of generated files; first: a
+    file that is included before, or None.
     """
     text, lines, seen, replaced, texts = [], [], set(), replaced or {}, texts or {}
 
@@ -39,6 +40,8 @@ def expand(name, replaced=None, texts=None):
                 text.append(line)
                 lines.append((file, number))
 
+    if first is not None:
+        add(first)
     add(name)
     return "\n".join(text) + "\n", lines
 
@@ -92,11 +95,12 @@ def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
     return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
 
 
-def compile_compute(info, file, replaced=None, texts=None):
-    """Return the compute program of a file; replaced, texts: as for `expand`. Raises `HairError`."""
-    text, lines = expand(file, replaced, texts)
+def compile_compute(info, file, replaced=None, texts=None, first=None):
+    """Return the compute program of a file; replaced, texts, first: as for `expand`. Raises `HairError`."""
+    text, lines = expand(file, replaced, texts, first)
     info.compute_source(text)
-    return _create(info, (file,), [], lines, tuple((texts or {}).values()))
+    files = (file,) if first is None else (first, file)
+    return _create(info, files, [], lines, tuple((texts or {}).values()))
 
 
 def _create(info, files, vertex_lines, lines, texts=()):

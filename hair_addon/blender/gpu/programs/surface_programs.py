@@ -64,26 +64,34 @@ def data_program():
 
 
 @cached
-def arrival_program(fragment):
-    """Return the program that measures the light on surfaces with a .frag."""
+def arrival_program(fragment, is_linked=False):
+    """Return the program that measures the light on surfaces with a .frag; is_linked: draw linked surfaces as
+    instances.
+    """
     info = gpu.types.GPUShaderCreateInfo()
-    _declare_lit(info)
+    first = _declare_lit(info, is_linked=is_linked)
+    if is_linked:
+        info.sampler(first, "FLOAT_2D", "transforms")
     info.vertex_out(_lit_varying())
-    return compile_drawing(info, "surfaces/lit_surface.vert", fragment)
+    return compile_drawing(info, "surfaces/linked_lit.vert" if is_linked else "surfaces/lit_surface.vert", fragment)
 
 
 @cached
-def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False):
+def depth_program(fragment="shadows/shadow_surface.frag", is_clipped=False, is_linked=False):
     """Return the program that draws a surface into a shadow map, or as an occluder.
 
-    is_clipped: apply clipping planes, as in surfaces/occluding_surface.frag.
+    is_clipped: apply clipping planes, as in surfaces/occluding_surface.frag; is_linked: draw linked surfaces as
+    instances.
     """
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
     replaced = scene_programs.declare_clipped_scene(info, (), is_clipped)
     info.sampler(0, "FLOAT_2D", "places")
+    if is_linked:
+        info.sampler(1, "FLOAT_2D", "transforms")
     varying.smooth("VEC3", "drawn_position")
     info.vertex_out(varying)
-    return compile_drawing(info, "surfaces/surface_depth.vert", fragment, replaced=replaced)
+    vertex = "surfaces/linked_depth.vert" if is_linked else "surfaces/surface_depth.vert"
+    return compile_drawing(info, vertex, fragment, replaced=replaced)
 
 
 def _declare_material(info, structs=""):
@@ -92,11 +100,11 @@ def _declare_material(info, structs=""):
     return _declare_lit(info, uniforms.SURFACE.source + structs, _MATERIAL_SAMPLERS)
 
 
-def _declare_lit(info, structs="", samplers=()):
+def _declare_lit(info, structs="", samplers=(), is_linked=False):
     scene_programs.declare_scene(info, structs, is_lit=False)
     names, first = (*SEEN_SAMPLERS, *CORNER_SAMPLERS, *samplers), len(scene_programs.SHADOW_SAMPLERS)
     for slot, name in enumerate(names, start=first):
-        info.sampler(slot, "FLOAT_2D", name)
+        info.sampler(slot, "FLOAT_2D_ARRAY" if is_linked and name in SEEN_SAMPLERS else "FLOAT_2D", name)
     return first + len(names)
 
 

@@ -71,9 +71,7 @@ class _Seen:
 
 def _seen(drawn, camera):
     """`_Seen` of a `DrawnScene` from a camera (world to view, view to clip)."""
-    # Both layers of hair that is wet in places, as their mix may change.
-    looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
-    return _Seen(looks, motion_vectors.places(drawn, *camera), camera[1] @ camera[0])
+    return _Seen(drawn.looks, motion_vectors.places(drawn, *camera), camera[1] @ camera[0])
 
 
 class History:
@@ -200,4 +198,6 @@ class History:
 
 
 def _are_same(looks, others):
+    if looks is others:
+        return True
     return len(looks) == len(others) and all(look is other for look, other in zip(looks, others, strict=True))

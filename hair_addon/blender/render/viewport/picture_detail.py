@@ -74,18 +74,19 @@ def _window(drawn, camera, size, is_shadowed):
     surfaces.
     """
     view = drawing.pass_record(*camera, size)
-    placed = [
-        (strands, drawing.strand_record(strands, view, to_world)) for strands, _shading, to_world, *_ in drawn.hair
-    ]
-    found = windows.of_strands(placed, size)
+    found = [np.zeros((0, 4), int)]
+    for batch in drawn.batches:
+        records = drawing.strand_records(batch.strands, view, batch.to_world)
+        found.append(windows.of_strands(batch.strands, records, size))
     if is_shadowed:
-        for (surface, _parts), is_darkened in zip(drawn.surfaces, drawn.is_shadowed, strict=True):
+        for surface, _lights, _seen, is_darkened in drawn.shadowed:
             if is_darkened:
-                found.append(windows.of_box(surface.bounds, camera[1] @ camera[0] @ surface.to_world, size))
-    low, high = np.array(size), np.zeros(2, int)
-    for left, bottom, width, height in found:
-        if width and height:
-            low, high = np.minimum(low, (left, bottom)), np.maximum(high, (left + width, bottom + height))
+                to_clip = camera[1] @ camera[0] @ surface.to_world.reshape(-1, 4, 4)
+                found.append(windows.of_boxes(surface.bounds, to_clip, size))
+    found = np.concatenate(found)
+    found = found[(found[:, 2:] > 0).all(axis=1)]
+    low = found[:, :2].min(axis=0, initial=max(size)).clip(max=size)
+    high = (found[:, :2] + found[:, 2:]).max(axis=0, initial=0)
     return (*low.tolist(), *np.maximum(high - low, 0).tolist())
 
 

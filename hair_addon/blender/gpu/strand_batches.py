@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked hair objects, which share strands and look, drawn together: their number does not change the number of calls.
+
+The objects' transforms and levels of detail are in a texture with a row for each: shaders/strands/batch_object.glsl.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import gpu
+import numpy as np
+
+from ...core.imaging.texture_sides import avoid_powers_of_two
+from . import drawing
+from .hair_shading import MixedShading, Shading
+from .programs import scene_programs
+from .strand_textures import StrandsOnGPU, run_for_each
+
+# Maximum number of objects with a common array texture: every driver supports as many layers.
+MOST_LAYERS = 256
+
+_TEXELS = 12  # per object
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Hair objects with the same strands, look, light and textures.
+
+    to_world: (N, 4, 4); indices: (N,) among all hair of a picture; layers: (N,) of each object in the textures of the
+    world's visibility, None for a single object with textures of its own; samplers: {name: texture} of the scene;
+    steps: `drawing.Steps`, whose numbers may be arrays (N,).
+    """
+
+    strands: StrandsOnGPU
+    shading: Shading | MixedShading
+    to_world: np.ndarray
+    indices: np.ndarray
+    layers: np.ndarray | None
+    samplers: dict
+    steps: drawing.Steps = field(default_factory=drawing.Steps)
+
+    def part(self, chosen):
+        """Return the batch of the objects among `chosen`, a list of indices of hair; their places in it are the new
+        indices.
+        """
+        places, within = np.nonzero(np.asarray(chosen)[:, None] == self.indices)
+        numbers = self.layers, self.steps.point_count, self.steps.strand_count
+        layers, points, strands = (one[within] if isinstance(one, np.ndarray) else one for one in numbers)
+        steps = replace(self.steps, point_count=points, strand_count=strands)
+        return replace(self, to_world=self.to_world[within], indices=places, layers=layers, steps=steps)
+
+
+def single(hair, index):
+    """Return the `Batch` of one object from (StrandsOnGPU, shading, (4, 4) object to world, samplers, steps)."""
+    strands, shading, to_world, samplers, steps = hair
+    return Batch(strands, shading, np.asarray(to_world)[None], np.array([index]), None, samplers, steps)
+
+
+def groups_of(keys):
+    """Return [indices] of equal keys, at most `MOST_LAYERS` each, in the order of their first index."""
+    groups, current = [], {}
+    for index, key in enumerate(keys):
+        group = current.get(key)
+        if group is None or len(group) == MOST_LAYERS:
+            group = current[key] = []
+            groups.append(group)
+        group.append(index)
+    return groups
+
+
+class Objects:
+    """The texture of the objects of a `Batch` that a picture shows, and their work groups.
+
+    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before them.
+    """
+
+    def __init__(self, records, layers, first_run):
+        runs_of_strand = -(-(records["drawn_points"].astype(np.int64) - 1) // scene_programs.RUN_LENGTH)
+        strands = records["drawn_strands"].astype(np.int64)
+        first_share = -(-strands // drawing.FIRST_SHARE)
+        walked = np.stack([strands, first_share, strands - first_share])  # by `drawing.WALK_ALL` and others
+        groups = -(-walked * runs_of_strand // scene_programs.RUN_GROUP_SIZE)
+        self._group_counts = groups.sum(axis=1)
+        runs = strands * runs_of_strand
+        texels = np.zeros((int(avoid_powers_of_two(len(records))), _TEXELS, 4), np.float32)
+        rows = texels[: len(records)]
+        rows[:, 0:4], rows[:, 4:8] = records["object_to_world"], records["object_to_clip"]
+        for channel, name in enumerate(("drawn_points", "drawn_strands", "object_scale", "thickness")):
+            rows[:, 8, channel] = records[name]
+        rows[:, 9, :2], rows[:, 9, 2] = _halves(records["first_segment"]), layers
+        rows[:, 10, :2] = _halves(first_run + np.cumsum(runs) - runs)
+        rows[:, 11, :3] = (np.cumsum(groups, axis=1) - groups).T
+        data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+        self.texture = gpu.types.GPUTexture((_TEXELS, len(texels)), format="RGBA32F", data=data)
+        self.texture.filter_mode(False)
+        first, strand_count, points = (
+            int(records[name][-1]) for name in ("first_segment", "strand_count", "drawn_points")
+        )
+        self.count, self.last_segment = len(records), first + strand_count * (points - 1) - 1
+
+    def rasterize(self, strands, program, blocks, samplers, images, constants, part):
+        """Run a compute program that rasterizes the segments of all objects: `drawing.rasterize_strands`."""
+        if not self._group_counts[part]:
+            return
+        with drawing.bound(program, blocks, {**drawing.strand_samplers(strands), **samplers, "objects": self.texture}):
+            for name, texture in images.items():
+                program.image(name, texture)
+            for name, value in (constants | {"object_count": self.count, "walked_part": part}).items():
+                program.uniform_int(name, value)
+            run_for_each(program, int(self._group_counts[part]), 1)
+
+
+def _halves(numbers):
+    """Return (N, 2) upper and lower 16 bits of (N,) integers."""
+    return np.stack([numbers >> 16, numbers & 0xFFFF], axis=1)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Linked heads are drawn together, with the pictures of heads that are drawn one by one."""
+
+import sys
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hair_addon.blender.gpu import strand_batches, surface_textures
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import hair_picture, picture_detail
+from hair_addon.blender.render.viewport.outline import HairOutline, OutlineStyle
+
+SIZE = (96, 64)
+WORLD_TO_VIEW = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, -9], [0, 0, 0, 1.0]])
+VIEW_TO_CLIP = np.array([[1.0, 0, 0, 0], [0, 1.5, 0, 0], [0, 0, -1.002, -0.2002], [0, 0, -1, 0]])
+
+PLACES = (
+    Matrix.Translation((-3.0, 0.0, 1.5)),
+    Matrix.Translation((0.0, -5.0, 1.0)) @ Matrix.Diagonal((-1.0, 1.0, 1.0, 1.0)),  # near, and mirrored
+    Matrix.Translation((3.0, 0.0, -1.0)) @ Matrix.Diagonal((0.5, 0.5, 1.5, 1.0)),
+    Matrix.Translation((-1.5, 20.0, -1.0)) @ Matrix.Rotation(1.0, 4, "X"),
+    Matrix.Translation((900.0, 0.0, 0.0)),  # outside of the picture
+    Matrix.Translation((0.0, 2.0, 0.2)) @ Matrix.Scale(0.01, 4),
+    Matrix.Translation((2.0, 3.0, 1.5)),  # hidden
+)
+
+
+def link(hair, places):
+    """Replace a head with hair by linked heads at (4, 4) places; returns their hair objects."""
+    head, found = hair.parent, []
+    for place in places:
+        others = [one.copy() for one in (head, hair)]
+        others[1].parent, others[0].matrix_world = others[0], place
+        for one in others:
+            bpy.context.scene.collection.objects.link(one)
+        found.append(others[1])
+    bpy.data.objects.remove(hair)
+    head.hide_viewport = head.hide_render = True
+    bpy.context.view_layer.update()
+    return found
+
+
+def read():
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+
+def pictures(drawn, channels, is_shadowed=False):
+    """Return the pixels of two passes of a picture and of an outline, and the hair at some pixels."""
+    picture, outline = hair_picture.HairPicture(SIZE, 2), HairOutline(SIZE)
+    outline.restart(channels, OutlineStyle((1.0, 0.5, 0.0), (0.8, 0.2, 0.0), 2.0, 1.0))
+    for _turn in range(2):
+        picture.add_pass(drawn, WORLD_TO_VIEW, VIEW_TO_CLIP, outline=outline, is_shadowed=is_shadowed)
+    found = [picture.hair_at(x, y) for x in range(0, SIZE[0], 5) for y in range(0, SIZE[1], 5)]
+    return picture.read(), np.array(outline._mask.read(), np.float32), found
+
+
+def test_linked_heads_look_the_same_drawn_together_and_one_by_one(thin, monkeypatch):
+    """Moved, mirrored, unevenly scaled, distant, tiny, hidden and selected heads have the same pixels."""
+    linked = link(thin, PLACES)
+    linked[-1].hide_render = True
+    channels = {1: 0, 3: 1}
+    drawn = read()
+    assert [len(batch.indices) for batch in drawn.batches] == [len(PLACES) - 1] and len(drawn.occluders) == 1
+    together, shadowed = pictures(drawn, channels), pictures(drawn, channels, is_shadowed=True)
+    assert set(together[2]) >= {None, 0, 1, 2} and len(drawn.shadowed) == 1
+    monkeypatch.setattr(strand_batches, "groups_of", lambda keys: [[index] for index, _key in enumerate(keys)])
+    drawn = read()
+    assert (len(drawn.batches), len(drawn.occluders)) == (len(PLACES) - 1, len(PLACES))
+    for is_shadowed, found in ((False, together), (True, shadowed)):
+        one_by_one = pictures(drawn, channels, is_shadowed)
+        np.testing.assert_array_equal(found[0], one_by_one[0])
+        np.testing.assert_array_equal(found[1], one_by_one[1])
+        assert found[2] == one_by_one[2]
+    assert together[0][..., 3].max() > 0.5 and together[1].max() > 0.5
+    assert np.abs(shadowed[0] - together[0]).max() > 0.1
+
+
+def test_one_head_alone_is_drawn_by_itself(thin):
+    drawn = read()
+    assert [batch.layers for batch in drawn.batches] == [None]
+    assert isinstance(drawn.occluders[0], surface_textures.SurfaceOnGPU)
+
+
+class Calls:
+    """Number of calls of Python functions and of the gpu module in a context."""
+
+    def __enter__(self):
+        self.count, self.dispatches = 0, 0
+        sys.setprofile(self._add)
+        return self
+
+    def _add(self, _frame, event, function):
+        self.count += event in ("call", "c_call")
+        self.dispatches += event == "c_call" and function is gpu.compute.dispatch
+
+    def __exit__(self, *_error):
+        sys.setprofile(None)
+
+
+@pytest.mark.parametrize("is_moved", [True, False], ids=["turning", "at rest"])
+def test_calls_of_a_frame_do_not_grow_with_the_number_of_heads(thin, monkeypatch, is_moved):
+    """A pass of 12 heads makes as many calls as one of 3: while a view turns, and at rest with shadows on surfaces."""
+    monkeypatch.setattr(picture_detail, "_MOST_PER_SIDE", 2)  # smaller hair is not drawn in a part of the picture
+    thin.data.vellus.hair.strand_count = 200
+    hair, found = thin, []
+    for count in (3, 12):
+        places = [Matrix.Translation((2.0 * (index % 4) - 3.0, 3.0 * (index // 4), 0.0)) for index in range(count)]
+        others = link(hair, places)
+        drawn, picture = read(), hair_picture.HairPicture(SIZE, 2)
+        view = WORLD_TO_VIEW.copy()
+        for turn in range(3):
+            view[0, 3] = 0.01 * turn * is_moved
+            if turn:
+                picture.restart(is_moved=is_moved)
+            with Calls() as calls:
+                picture.add_pass(drawn, view, VIEW_TO_CLIP, is_shadowed=not is_moved)
+        found.append((calls.count, calls.dispatches))
+        hair = others[0]
+        for one in others[1:]:
+            bpy.data.objects.remove(one.parent)
+            bpy.data.objects.remove(one)
+    assert found[0] == found[1] and found[0][1] > 3
