@@ -124,7 +124,9 @@ def curves_of(path, wanted, surface_object, is_open=False):
     path = Path(path)
     require_readable(path)
     if path.suffix.lower() != ".blend":
-        yield made_of(path, read(path, wanted.axis), wanted, surface_object)
+        with whole_changes.whole_change():
+            made = made_of(path, read(path, wanted.axis), wanted, surface_object)
+        yield made
         return
     if wanted.convention != Convention():
         raise HairError("{path} has its own unit and axes: leave out the options for unit and axis.", path=path)

@@ -115,8 +115,10 @@ def _humanoid(rigs):
     """
     largest = sorted(rigs, key=lambda one: -len(one.data.bones))
     for rig in largest:
-        with contextlib.suppress(HairError):
-            return rig, vrm.humanoid_bones(bone.name for bone in rig.data.bones)
+        # Controls of a generated rig can have the usual names too, but they do not deform.
+        for bones in ([bone for bone in rig.data.bones if bone.use_deform], rig.data.bones):
+            with contextlib.suppress(HairError):
+                return rig, vrm.humanoid_bones(bone.name for bone in bones)
     return None, vrm.humanoid_bones(bone.name for rig in largest[:1] for bone in rig.data.bones)
 
 

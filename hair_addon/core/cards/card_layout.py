@@ -4,9 +4,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
 from ..geometry.mesh import TriMesh
-from ..geometry.search import clusters
+from ..geometry.search import clusters, hash_grid
 from ..long_work import Progress, no_progress
 from . import atlas, outlines, ribbons
 from .card_settings import CardSettings, Level
@@ -15,6 +16,9 @@ from .polygon_mesh import PolygonMesh
 from .texels import NO_STRAND, PlacedStrands
 
 _CAP_REACH = 0.25  # part of the strands, from the root, on cards that lie on the surface
+_FEW = 8  # lines that are compared with a line at first, its own included
+_AT_ONCE = 100_000  # pairs of lines in a batch
+_TINY = 1e-6  # [m]
 
 
 @dataclass(frozen=True)
@@ -137,19 +141,47 @@ def _outermost(points, features, clump_count, count):
     middles, sizes = clusters.cluster_means(points, labels, clump_count), np.bincount(labels)
     away = np.linalg.norm(points - middles[labels], axis=-1).mean(axis=1)
     away *= sizes[labels] / np.maximum(sizes[labels] - 1, 1)  # distance from the middle of the other strands
-    centers = middles.mean(axis=1, dtype=np.float64)
-    for strand in np.flatnonzero(sizes[labels] == 1) if clump_count > 1 else ():
-        # Lines are at least as far apart as their centers, so that few of them are compared point by point.
-        least = np.linalg.norm(points[strand].mean(axis=0, dtype=np.float64) - centers, axis=-1)
-        least[labels[strand]] = np.inf
-        most = _distances(points[strand], middles[[least.argmin()]])[0]
-        away[strand] = _distances(points[strand], middles[least <= max(1.00001 * most, least.min())]).min()
+    alone = np.flatnonzero(sizes[labels] == 1) if clump_count > 1 else np.zeros(0, int)
+    if len(alone):
+        away[alone] = _nearest_others(points[alone], middles, labels[alone])
     return np.sort(np.argsort(-away, kind="stable")[:count])
 
 
+def _nearest_others(lines, middles, own):
+    """Return mean distances (N,) between lines (N, P, 3) and the nearest of middles (C, P, 3) but their own (N,).
+
+    Lines are at least as far apart as their centers, so that lines with near centers are compared, and more of them
+    only while others may be nearer.
+    """
+    centers = middles.mean(axis=1)
+    origin = centers.mean(axis=0)
+    targets = wp.array((centers - origin).astype(np.float32), dtype=wp.vec3, device="cpu")
+    extent = max(2.0 * float(np.linalg.norm(centers - origin, axis=1).max()), _TINY)
+    found, rest, count = np.full(len(lines), np.inf), np.arange(len(lines)), _FEW
+    while len(rest):
+        count = min(count, len(middles), hash_grid.LIMIT)
+        places = wp.array((centers[own[rest]] - origin).astype(np.float32), dtype=wp.vec3, device="cpu")
+        near, apart = (rows.numpy() for rows in hash_grid.neighbours(targets, places, extent, count))
+        for rows in np.array_split(np.arange(len(rest)), -(-near.size // _AT_ONCE)):
+            away = _distances(lines[rest[rows], None], middles[near[rows]])
+            away[(near[rows] == own[rest[rows], None]) | (near[rows] < 0)] = np.inf
+            found[rest[rows]] = away.min(axis=1)
+        if count == len(middles):
+            break
+        rest = rest[found[rest] > 0.9999 * apart[:, -1]]
+        if count == hash_grid.LIMIT:
+            for line in rest:
+                away = _distances(lines[line], middles)
+                away[own[line]] = np.inf
+                found[line] = away.min()
+            break
+        count *= 4
+    return found
+
+
 def _distances(line, lines):
-    """Return mean distances (N,) between the points of a line (P, 3) and those of lines (N, P, 3)."""
-    return np.linalg.norm(line - lines, axis=-1).mean(axis=1)
+    """Return mean distances (..., N) between the points of a line (..., P, 3) and those of lines (..., N, P, 3)."""
+    return np.linalg.norm(line - lines, axis=-1).mean(axis=-1)
 
 
 def _second(points, part, count):

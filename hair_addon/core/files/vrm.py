@@ -73,7 +73,7 @@ def _add(found, missing, bone, keys, known):
 
 def _plain(name):
     """Return (side: "left", "right" or "", name without side and separators in small letters) of a bone."""
-    text = name.rpartition(":")[2]
+    text = name.rpartition(":")[2].removeprefix("DEF-")  # deforming bones of rigs that Rigify generates
     text = re.sub(r"^J_Bip_([CLR])_", lambda match: {"C": "", "L": "Left", "R": "Right"}[match[1]], text)
     side = ""
     for pattern, found in ((r"^left|[._ -]l$", "left"), (r"^right|[._ -]r$", "right")):

@@ -126,24 +126,25 @@ _READERS = {
     "BSDF_TRANSPARENT": _read_transparent,
 }
 
-# {type of shader: its inputs that are read}.
-READ = {
-    "BSDF_PRINCIPLED": (
-        "Base Color",
-        "Roughness",
-        "Metallic",
-        "IOR",
-        "Specular IOR Level",
-        "Normal",
-        "Transmission Weight",
-        "Alpha",
-    ),
-    "BSDF_DIFFUSE": ("Color",),
-    "BSDF_GLASS": ("IOR", "Roughness"),
-    "BSDF_REFRACTION": (),
-    "BSDF_TRANSPARENT": (),
-}
 
+class _Noted:
+    """A `ShaderNode` that notes the names of its inputs that are read."""
+
+    def __init__(self, sockets):
+        self._sockets, self.names = sockets, []
+
+    def __getitem__(self, name):
+        self.names.append(name)
+        return self._sockets[name]
+
+
+def inputs_read(sockets, material):
+    """Return the names of the inputs of a `ShaderNode` that the reader of its type reads; None for other types."""
+    if sockets.type not in _READERS:
+        return None
+    noted = _Noted(sockets)
+    _READERS[sockets.type](noted, material)
+    return list(dict.fromkeys(noted.names))
 
 def _reflectance(refractive_index, level):
     """Reflectance at normal incidence; level: a factor, 1 at ½."""

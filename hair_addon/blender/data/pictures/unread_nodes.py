@@ -29,10 +29,10 @@ def sentences(scene):
     lights = {one.data for one in objects if one.type == "LIGHT"}
     materials = {slot.material for one in objects if one.type == "MESH" for slot in one.material_slots}
     found = (
-        (_OF_LIGHTS, {light: _unread_of(light.node_tree, {"EMISSION": ("Color", "Strength")}, ()) for light in lights}),
+        (_OF_LIGHTS, {light: _unread_of(light.node_tree, _inputs_of_light, ()) for light in lights}),
         (
             _OF_MATERIALS,
-            {one: _unread_of(one.node_tree, surface_materials.READ, _IMAGES) for one in materials if one is not None},
+            {one: _unread_of(one.node_tree, _inputs_of(one), _IMAGES) for one in materials if one is not None},
         ),
     )
     return [(text, {"names": _listed(unread)}) for text, unread in found if any(unread.values())]
@@ -41,10 +41,19 @@ def sentences(scene):
 _IMAGES = ("TEX_IMAGE", "NORMAL_MAP", "SEPARATE_COLOR")
 
 
+def _inputs_of_light(shader):
+    return ("Color", "Strength") if shader.type == "EMISSION" else None
+
+
+def _inputs_of(material):
+    return lambda shader: surface_materials.inputs_read(shader, material)
+
+
 def _unread_of(tree, read, textures):
     """Return the labels of nodes before a tree's output that are not read.
 
-    read: {type of shader: its inputs that are read}; textures: types of other nodes that are read.
+    read: from a `ShaderNode` to its inputs that are read, None without any; textures: types of other nodes that are
+    read.
     """
     output = None if tree is None else tree.get_output_node("ALL")
     if output is None:
@@ -52,9 +61,10 @@ def _unread_of(tree, read, textures):
     shader = ShaderInput(output.inputs["Surface"]).source()[0]
     if shader is None:
         return []
-    if shader.type not in read:
+    names = read(shader)
+    if names is None:
         return [shader.node.bl_label]
-    return [label for name in read[shader.type] for label in _before(shader[name], textures)]
+    return [label for name in names for label in _before(shader[name], textures)]
 
 
 def _before(shader_input, textures):
