@@ -102,6 +102,7 @@ def _avatar(chosen):
     """
     rigs = [one for one in chosen if one.type == "ARMATURE"]
     humanoid, bones = _humanoid(rigs)
+    bpy.context.view_layer.update()  # else it lists removed objects as None
     shown = bpy.context.view_layer.objects
     body = [one for one in shown if one.type == "MESH" and not one.hide_render and _follows(one, humanoid)]
     hair = [one for one in chosen if one.type == "MESH" and not one.hide_render]

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender.io import curve_objects
+from hair_addon.core.errors import HairError
 from hair_addon.core.files import alembic
 from tests.support.commands import load, run_here
 from tests.support.dynamics.following import update
@@ -125,3 +127,20 @@ def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines,
             assert len(strand) == 5 if kind == "POLY" else len(strand) > 5
             np.testing.assert_allclose(strand[[0, -1]], its[[0, -1]], atol=1e-5)
             assert np.linalg.norm(strand[:, None] - its, axis=2).min(axis=0).max() < 1e-5
+
+
+def test_a_failed_import_leaves_nothing(hair, tmp_path, monkeypatch):
+    """If the hair of a groom cannot be made after its guides, no object and no Curves of them stay."""
+    api.export_groom(tmp_path / "groom.abc", [hair])
+    before = {*bpy.data.objects}, {*bpy.data.hair_curves}
+    made, real = [], curve_objects.new_object
+
+    def new_object(*arguments, **options):
+        if made:
+            raise HairError("No hair.")
+        made.append(real(*arguments, **options).name)
+
+    monkeypatch.setattr(curve_objects, "new_object", new_object)
+    with pytest.raises(HairError, match=r"No hair\."):
+        api.import_curves(tmp_path / "groom.abc", bpy.data.objects["Sphere"])
+    assert made == ["Guides.001"] and ({*bpy.data.objects}, {*bpy.data.hair_curves}) == before

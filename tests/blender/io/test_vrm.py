@@ -66,6 +66,26 @@ def test_an_avatar_has_the_humanoid_its_meshes_and_springs(hair, tmp_path, chain
     assert [path.name for path in tmp_path.iterdir()] == ["avatar.vrm"]
 
 
+def test_bones_of_a_generated_rig_are_those_that_deform(hair, tmp_path):
+    """Controls that have usual names, as in rigs that Rigify generates, are not bones of the humanoid."""
+    armature = humanoid(bpy.data.objects["Sphere"])
+    for bone in armature.data.bones:
+        bone.name = f"DEF-{bone.name}"
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in ("head", "hips"):
+        bone = armature.data.edit_bones.new(name)
+        bone.head, bone.tail, bone.use_deform = (0, 2, 0), (0, 3, 0), False
+    bpy.ops.object.mode_set(mode="OBJECT")
+    update()
+    made = api.make_hair_cards(hair, card_count=4, segment_count=1, texture_size=128)
+    mesh_export.write(tmp_path / "avatar.vrm", made)
+    described, _chunks = glb.read(tmp_path / "avatar.vrm")
+    bones = described["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"]
+    named = {bone: described["nodes"][node["node"]]["name"] for bone, node in bones.items()}
+    assert named == {bone: f"DEF-{bone}" for bone in named} and len(named) == 15
+
+
 def test_other_armatures_are_refused_and_leave_no_file(hair, tmp_path):
     made = api.make_hair_cards(hair, card_count=4, segment_count=1, texture_size=128)
     with pytest.raises(HairError, match="missing: hips, spine"):

@@ -146,6 +146,7 @@ def inputs_read(sockets, material):
     _READERS[sockets.type](noted, material)
     return list(dict.fromkeys(noted.names))
 
+
 def _reflectance(refractive_index, level):
     """Reflectance at normal incidence; level: a factor, 1 at ½."""
     return min(2.0 * level * ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2, 0.99)

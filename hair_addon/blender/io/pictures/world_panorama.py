@@ -8,10 +8,12 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import HairError, cause_of
+from ...data.pictures import shader_sockets
 from ...host import scene_time
 
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
-SAMPLES = 16  # of a pixel
+SAMPLES = 4  # of a pixel
+SUN_SAMPLES = 16  # of worlds with the sun of a Sky Texture: its disk covers two pixels
 
 # Values of the Light Path node for light that hair scatters.
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
@@ -37,7 +39,7 @@ def render(path, frame, out):
     scene.camera = bpy.data.objects.new("Panorama", camera)
     scene.camera.rotation_euler = 0.5 * math.pi, 0.0, -0.5 * math.pi  # looks along +x, z up
     scene.collection.objects.link(scene.camera)
-    _set_up(scene)
+    _set_up(scene, SUN_SAMPLES if _has_sun(scene.world.node_tree) else SAMPLES)
     scene_time.go_to_time(scene, frame)
     out = Path(out)
     scene.render.filepath = str(out.with_suffix(".part.exr"))
@@ -45,9 +47,15 @@ def render(path, frame, out):
     os.replace(scene.render.filepath, out)
 
 
-def _set_up(scene):
+def _has_sun(tree):
+    """Whether a Sky Texture shows the disk of its sun."""
+    skies = [one.node for one in shader_sockets.nodes_of(tree) if one.type == "TEX_SKY"]
+    return any(sky.sun_disc and sky.sky_type.endswith("SCATTERING") for sky in skies)
+
+
+def _set_up(scene, samples):
     cycles, render = scene.cycles, scene.render
-    cycles.device, cycles.samples = "CPU", SAMPLES
+    cycles.device, cycles.samples = "CPU", samples
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"  # so that pixels receive all light of the sun
     (render.resolution_x, render.resolution_y), render.resolution_percentage = SIZE, 100
