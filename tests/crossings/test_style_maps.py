@@ -11,9 +11,13 @@ from mathutils import Matrix
 
 from hair_addon import api
 from hair_addon.blender.data.maps import strand_maps
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import bindings, changed_weights, strand_thickness
+from hair_addon.blender.settings import map_items
+from hair_addon.blender.ui import map_rows
 from tests.support.commands import load, run_here
 from tests.support.exchange.imported import select
+from tests.support.interface.layout import Layout
 from tests.support.overridden import override, parts
 from tests.support.reading import points
 
@@ -302,3 +306,43 @@ def test_painting_where_guides_are_on_another_surface(curls):
     bound = strand_maps.looks_of(curls.data, strand_thickness.strands_of(curls.data, bindings.of(curls.data)))[0]
     np.testing.assert_array_equal(written.root, bound.root)
     assert np.ptp(written.root[:, 0]) > 0.1
+
+
+def test_linked_hair_shows_its_maps(curls, tmp_path):
+    """Hair that is linked without an override has the strands, looks and radii of its maps; a map can be looked at, its
+    rows are gray below the reason, and nothing can be changed.
+    """
+    vary(curls)
+    api.set_map(curls.data, "look.melanin", "group:half", low=0.25)
+    api.set_map(curls.data, "strands.thickness", "group:half", low=0.25)
+    update()
+
+    def values(hair):
+        looks = strand_maps.read_looks(hair.data)
+        return points(hair), looks.root, curves.read_radii(hair.data)
+
+    wanted = values(curls)
+    assert all(len(np.unique(of_all[..., 0] if of_all.ndim > 1 else of_all)) > 1 for of_all in wanted[1:])
+    path = str(tmp_path / "curls.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_there, here):
+        here.objects = ["Sphere", "Guides", "Hair"]
+    for linked in here.objects:
+        bpy.context.collection.objects.link(linked)
+    update()
+    hair = here.objects[2]
+    bpy.context.scene.frame_set(5)
+    hair.data.update_tag()
+    update()
+    for found, known in zip(values(hair), wanted, strict=True):
+        np.testing.assert_array_equal(found, known)
+    bpy.context.view_layer.objects.active = hair
+    assert bpy.ops.vellus.edit_map(setting=RADIUS) == {"FINISHED"}
+    layout, item = Layout(), map_items.item_of(hair.data.vellus, RADIUS)
+    map_rows.draw(layout, item, hair.data)
+    assert "is linked from another file" in " ".join(layout.texts)
+    for setting, change in (("styles.Curl.pitch", bpy.ops.vellus.edit_map), (RADIUS, bpy.ops.vellus.remove_map)):
+        with pytest.raises(RuntimeError, match="linked from another file"):
+            change(setting=setting)
+    assert [one.setting for one in api.maps_of(hair.data)] == [RADIUS, "look.melanin", "strands.thickness"]

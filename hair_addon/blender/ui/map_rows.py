@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rows of a map: its kind, the picker of this kind, and how it changes its setting; the curve of the thickness."""
 
+import textwrap
+
+from ...core.errors import HairError
 from ...core.maps import varied_settings
 from ..data.strands import curves
 from ..groom.styles import painted_maps
 from ..settings import map_items, ramp_nodes
+from ..settings.translations import error_text
+
+_CHARACTERS = 44  # of a line of the popover
 
 
 def button(layout, state, setting):
@@ -18,7 +24,14 @@ def button(layout, state, setting):
 
 
 def draw(layout, item, hair):
-    """Draw the rows of a map of hair Curves."""
+    """Draw the rows of a map of hair Curves; gray, below the reason, if these are linked or overridden."""
+    try:
+        curves.require_editable(hair)
+    except HairError as error:
+        for line in textwrap.wrap(error_text(error), _CHARACTERS):
+            layout.label(text=line, translate=False)
+        layout = layout.column()
+        layout.enabled = False
     layout.use_property_split = True
     layout.use_property_decorate = False
     layout.prop(item, "kind")

@@ -36,10 +36,10 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
         return context.window_manager.invoke_popup(self, width=280)
 
     def change(self, context):
-        """Add a map without a source if the setting has none."""
+        """Add a map without a source if the setting has none; an existing map of linked hair can be looked at."""
         owner = _owner_of(context, self.setting)
-        require_editable(owner)
         if map_items.item_of(owner.vellus, self.setting) is None:
+            require_editable(owner)
             map_items.add(owner.vellus, self.setting)
 
     def draw(self, context):
