@@ -79,10 +79,11 @@ def read(
 
 def _limited(details, value):
     """Return the `Param` of a setting, with a smallest value in place of zero for a setting that must be positive."""
-    return details if details.above == -np.inf else replace(details, low=_LEAST * value, above=-np.inf)
+    least = _LEAST_LOCK if details.is_structural else _LEAST
+    return details if details.above == -np.inf else replace(details, low=least * value, above=-np.inf)
 
 
-_LEAST = 1e-3  # of the setting
+_LEAST, _LEAST_LOCK = 1e-3, 0.1  # of the setting; of a size of locks, as small locks are many
 
 
 def are_same(numbers: Numbers, others: Numbers) -> bool:

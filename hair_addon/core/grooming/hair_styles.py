@@ -86,8 +86,10 @@ def bind_styles(
     """
     if cut is None and is_plain(guides, settings, styles):
         return None
-    trees.search([tree for tree, _level in styling.program.tree_levels(styles)], progress)
     inputs = Inputs() if inputs is None else inputs
+    found = styling.varied_numbers.varied_trees(styles, inputs.numbers, binding)
+    varied = {place: tree.tree for place, tree in found.items()}
+    trees.search([tree for tree, _level in styling.program.tree_levels(styles, varied)], progress)
     if cut is not None or settings.strand_length != 1.0:
         mask = CutMask(settings.strand_length) if cut is None else cut
         styles = (styling.program.CUT, *styles)

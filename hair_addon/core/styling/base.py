@@ -97,12 +97,13 @@ class TreeSettings:
     """Inputs for the clump sites of a style.
 
     sizes: distance between the sites of each level [m], the largest first; crossover: fraction of the strands that
-    belong to the second nearest site.
+    belong to the second nearest site; variants: the trees that strands choose among if their sizes differ.
     """
 
     sizes: tuple[float, ...]
     seed: int
     crossover: float
+    variants: "tuple[TreeSettings, ...]" = ()
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,7 @@ class Settings(ProfiledSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         is_structural=True,
+        may_vary=True,
     )
     radius: float = param(
         0.006,

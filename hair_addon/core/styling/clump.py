@@ -45,6 +45,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         is_structural=True,
+        may_vary=True,
     )
     levels: int = param(
         2,

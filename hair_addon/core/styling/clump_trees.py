@@ -60,7 +60,10 @@ class ClumpTrees:
 
         progress(step, part): called during placement; if it raises, no part of the tree is stored.
         """
-        if tree not in self._levels:
+        if tree not in self._levels and tree.variants:
+            found = [self.levels(variant, progress) for variant in tree.variants]
+            self._levels[tree] = [self._joined(levels) for levels in zip(*found, strict=True)]
+        elif tree not in self._levels:
             counts = self.site_counts(tree)
             ends = [0.0, *(sum(counts[: level + 1]) / sum(counts) for level in range(len(counts)))]
             self._levels[tree] = [
@@ -70,6 +73,13 @@ class ClumpTrees:
         else:
             self._levels[tree] = self._levels.pop(tree)  # most recently used
         return self._levels[tree]
+
+    def _joined(self, bindings):
+        """Return the `HairBinding` of the centers of a level of several trees, one after the other."""
+        roots = bindings[0].roots
+        for binding in bindings[1:]:
+            roots = roots.joined(binding.roots)
+        return self.binder.bind(roots)
 
     def site_counts(self, tree: TreeSettings) -> list[int]:
         """Return the number of sites of each level, the coarsest first."""
@@ -113,11 +123,18 @@ class ClumpTrees:
             self.binder.with_settings(settings), self.place, self.area, weighed, self._members, self._parents
         )
 
-    def members(self, owner: Owner, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
+    def members(
+        self, owner: Owner, strands: HairBinding, tree: TreeSettings, choice: np.ndarray | None = None
+    ) -> list[np.ndarray]:
         """Return (S,) int32 per level, the coarsest first: the index of each strand's center in its level, -1 for none.
 
-        owner: key of the strands.
+        owner: key of the strands; choice: (S,) the variant of each strand, for a tree with variants.
         """
+        if tree.variants:
+            of_variants = [self.members(owner, strands, variant) for variant in tree.variants]
+            return [
+                self._chosen(tree, level, rows, choice) for level, rows in enumerate(zip(*of_variants, strict=True))
+            ]
         key = owner, tree
         if key not in self._members:
             nearest = self._nearest(strands, self.levels(tree)[-1])
@@ -127,6 +144,16 @@ class ClumpTrees:
                 nearest[crosses, 0] = nearest[crosses, 1]
             self._members[key] = self._upward(tree, nearest[:, 0], len(tree.sizes) - 1)
         return self._members[key]
+
+    def _chosen(self, tree, level, rows, choice):
+        """Return (S,) the centers of strands on a level of a tree with variants; rows: by each variant (S,)."""
+        return np.choose(choice, self._shifted(tree, level, rows)).astype(np.int32)
+
+    def _shifted(self, tree, level, rows):
+        """Return the rows of centers of each variant, as indices among the centers of all variants on a level."""
+        counts = [len(self.levels(variant)[level].roots) for variant in tree.variants]
+        firsts = np.concatenate([[0], np.cumsum(counts[:-1])])
+        return [np.where(row >= 0, row + first, -1) for row, first in zip(rows, firsts, strict=True)]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
         """Return (K,) int32 per level, the coarsest first: the centers of coarser levels above the centers of a level.
@@ -139,13 +166,20 @@ class ClumpTrees:
     def _upward(self, tree, places, level):
         """Return indices in a level and in all coarser levels, the coarsest first."""
         found = [places]
-        levels = self.levels(tree)
         for finer in range(level, 0, -1):
             key = tree, finer
             if key not in self._parents:
-                self._parents[key] = self._nearest(levels[finer], levels[finer - 1])[:, 0]
+                self._parents[key] = self._parents_of(tree, finer)
             found.insert(0, np.where(found[0] >= 0, self._parents[key][found[0]], -1))
         return found
+
+    def _parents_of(self, tree, level):
+        """Return (K,) int32 the center of each center of a level in the next coarser level."""
+        if tree.variants:
+            rows = [self._parents_of(variant, level) for variant in tree.variants]
+            return np.concatenate(self._shifted(tree, level - 1, rows)).astype(np.int32)
+        levels = self.levels(tree)
+        return self._nearest(levels[level], levels[level - 1])[:, 0]
 
     def _nearest(self, strands, centres):
         nearest = self.binder.nearest(strands, centres)

@@ -4,6 +4,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -46,9 +47,14 @@ def tree_settings(settings: StyleSettings) -> TreeSettings | None:
     return module.tree(settings) if hasattr(module, "tree") else None
 
 
-def tree_levels(styles: Sequence[StyleSettings]) -> list[tuple[TreeSettings, int]]:
-    """Return [(tree, level)] of all styles that gather strands, in the order in which their centers are computed."""
-    trees = [tree_settings(settings) for settings in styles if has_effect(settings)]
+def tree_levels(
+    styles: Sequence[StyleSettings], varied: Mapping[int, TreeSettings] = MappingProxyType({})
+) -> list[tuple[TreeSettings, int]]:
+    """Return [(tree, level)] of all styles that gather strands, in the order in which their centers are computed.
+
+    varied: trees with variants, by the index of their style.
+    """
+    trees = [varied.get(place, tree_settings(style)) for place, style in enumerate(styles) if has_effect(style)]
     return [(tree, level) for tree in trees if tree is not None for level in range(len(tree.sizes))]
 
 

@@ -20,7 +20,7 @@ from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
 from . import kinds, steps, strand_wetness, varied_numbers
 from . import program as programs
-from .base import StyleSettings, TreeSettings
+from .base import StyleSettings, TreeSettings, has_effect
 from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
 from .program import Program, mask_key
@@ -219,14 +219,16 @@ def bind(
     the surface's own, without scale; point_count: points per strand.
     """
     device = binding.positions.device
-    levels = programs.tree_levels(styles)
+    varied = varied_numbers.varied_trees(styles, inputs.numbers, binding)
+    levels = programs.tree_levels(styles, {place: found.tree for place, found in varied.items()})
+    choices = [varied.get(place) for place, style in enumerate(styles) for _level in _levels_of(style)]
     keys = programs.mask_keys(styles)
     bindings = [trees.levels(tree)[level] for tree, level in levels]
     counts = [len(bound.roots) for bound in bindings]
     first_centres = [0, *np.cumsum(counts).tolist()]
     made = programs.strand_steps(styles, inputs.cutters)
-    varied = varied_numbers.places_of(made, inputs.numbers)
-    program = programs.compiled(made, keys, first_centres, varied)
+    numbers = varied_numbers.places_of(made, inputs.numbers)
+    program = programs.compiled(made, keys, first_centres, numbers)
     guide_identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
     centre_normals = [side * bound.normals.numpy() for bound in bindings]
@@ -247,11 +249,14 @@ def bind(
             if not isinstance(owner, str) and owner[0] == tree and level <= owner[1]:
                 rows[row] = trees.parents(tree, owner[1])[level]
             else:
-                rows[row] = trees.members(owner, bound, tree)[level]
+                clumps = _finest_clumps(levels, owner, rows, row)
+                chooser = choices[row]
+                choice = None if chooser is None else chooser.choice(bound, clumps)
+                rows[row] = trees.members(owner, bound, tree, choice)[level]
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         clumps = _finest_clumps(levels, owner, rows, known)
         values = [inputs.masks[key].of_strands(bound, clumps) for key in keys]
-        for step, places in zip(made[:step_count], varied, strict=False):
+        for step, places in zip(made[:step_count], numbers, strict=False):
             if places:
                 locks = None if step.level is None else (bindings[step.level], rows[step.level])
                 values += varied_numbers.rows_of(step, inputs.numbers, inputs.cutters, bound, clumps, locks)
@@ -269,7 +274,8 @@ def bind(
         before = _steps_before(program, made, row)
         centres.append(_Level(bound, first_centres[row], before, data_of(levels[row], bound, row, len(before))))
     if levels:
-        trees.keep_only({tree for tree, _level in levels})
+        used = {tree for tree, _level in levels}
+        trees.keep_only(used.union(*(tree.variants for tree in used)))
     of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
     leaning = leans(
         styles,
@@ -293,6 +299,12 @@ def bind(
         levels,
         centres,
     )
+
+
+def _levels_of(style):
+    """Return the sizes of the levels of locks of a style."""
+    tree = programs.tree_settings(style) if has_effect(style) else None
+    return () if tree is None else tree.sizes
 
 
 def _finest_clumps(levels, owner, rows, known):

@@ -3,17 +3,24 @@
 
 A style computes the numbers of its steps from its settings. Settings that differ are arrays there, so each number has
 one equation, and an array of equal values gives the bits of the value.
+
+Where sizes of locks differ, each size has a clump tree of its own over the whole surface, and a strand belongs to locks
+of the tree of its own size. So locks of one size are where they are in hair with this size everywhere. More than
+`MOST_SIZES` sizes are replaced by as many sizes in equal ratios.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
+from ..params import declared
 from . import kinds, program
-from .base import Cutter, Step
+from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
+
+MOST_SIZES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,3 +92,58 @@ def _ordered(step, values, cutters):
     if not values:
         return []
     return program.numbers_of(kinds.steps_of(kinds.with_values(step.settings, values), cutters)[step.part])
+
+
+@dataclass(frozen=True, eq=False)
+class VariedTree:
+    """The tree of a style whose size of locks differs between strands.
+
+    number: the sizes of strands; sizes: (N,) [m] of the trees, rising; tree: with these trees as variants.
+    """
+
+    number: NumberMap
+    sizes: np.ndarray
+    tree: TreeSettings
+
+    def choice(self, binding: HairBinding, clumps: np.ndarray | None) -> np.ndarray:
+        """Return (S,) the variant of each strand: the nearest size by ratio; clumps: as of `NumberMap`."""
+        return _nearest(self.number.read(binding.roots, binding.identities[0], clumps), self.sizes)
+
+
+def varied_trees(
+    styles: Sequence[StyleSettings], numbers: Mapping[tuple[int, str], NumberMap], binding: HairBinding
+) -> dict[int, VariedTree]:
+    """Return {index of the style: its `VariedTree`} of styles whose size of locks differs between bound strands."""
+    found = {}
+    for place, settings in enumerate(styles):
+        base = program.tree_settings(settings) if has_effect(settings) else None
+        name = next((name for its, name in numbers if its == place and _is_size(settings, name)), None)
+        if base is None or name is None:
+            continue
+        number = numbers[place, name]
+        sizes = _distinct(number.read(binding.roots, binding.identities[0], None))
+        if not len(sizes):
+            continue
+        trees = (program.tree_settings(replace(settings, **{name: size})) for size in sizes.tolist())
+        variants = tuple(tree for tree in trees if tree is not None)
+        tree = variants[0] if len(variants) == 1 else replace(base, variants=variants)
+        found[place] = VariedTree(number, sizes, tree)
+    return found
+
+
+def _is_size(settings, name):
+    return any(its == name and details.is_structural for its, _default, details in declared(type(settings)))
+
+
+def _distinct(values):
+    """Return at most `MOST_SIZES` of (S,) values, rising."""
+    found = np.unique(values)
+    if len(found) <= MOST_SIZES:
+        return found
+    return np.geomspace(found[0], found[-1], MOST_SIZES)
+
+
+def _nearest(values, sizes):
+    """Return the indices (S,) of the sizes (N,) with the ratios to values (S,) nearest to one."""
+    borders = np.sqrt(sizes[1:] * sizes[:-1])
+    return np.searchsorted(borders, values)

@@ -40,6 +40,7 @@ class Settings(StyleSettings):
         unit="LENGTH",
         subtype="DISTANCE",
         is_structural=True,
+        may_vary=True,
     )
     cling: float = param(
         0.35, "How far wet hair leans down at its roots", low=0.0, high=1.0, subtype="FACTOR", may_vary=True

@@ -164,3 +164,30 @@ def test_guides_lean_by_their_own_values(hair):
     is_weak, is_whole = ((found == other).all(axis=(1, 2)) for other in (weak, whole))
     assert min(is_weak.sum(), is_whole.sum()) > 0.2 * len(found)
     assert not (is_weak & is_whole).any()
+
+
+def test_sizes_of_locks_by_a_map(hair, window):  # noqa: F811
+    """Each half has the locks of its size, drawn as they are written; a constant map is the size, and another map of
+    the same sizes moves strands.
+    """
+    setting = "styles.Clump.size"
+    api.add_style(hair.data, "CLUMP", size=0.5)
+    name, surface = half_group()
+    whole = points(hair.data)
+    api.set_map(hair.data, setting, "strand", low=1.0, high=1.0)
+    np.testing.assert_array_equal(points(hair.data), whole)
+    api.set_map(hair.data, setting, "strand", low=0.5, high=0.5)
+    half = points(hair.data)
+    api.set_map(hair.data, setting, f"group:{name}", low=0.5, high=1.0)
+    found = points(hair.data)
+    is_half, is_whole = ((found == other).all(axis=(1, 2)) for other in (half, whole))
+    assert min(is_half.sum(), is_whole.sum()) > 0.2 * len(found)
+    drawn(hair)
+    surface.vertex_groups[name].add([v.index for v in surface.data.vertices if v.co.z > 0.0], 1.0, "REPLACE")
+    surface.data.update_tag()
+    bpy.context.view_layer.update()
+    drawn(hair)
+    shown = drawn_strands.places(hair_cache.strands_on_gpu(hair.data))
+    bindings.of(hair.data).update_points()
+    np.testing.assert_allclose(shown, bindings.of(hair.data).points, atol=2e-5)
+    assert np.abs(shown - found).max() > 0.01

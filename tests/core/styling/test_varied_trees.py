@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sizes of locks that differ between strands: each strand is in the lock of hair with the strand's size everywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hair_addon.core.styling import braid, clump, curl, wet
+from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.varied_numbers import MOST_SIZES, NumberMap, varied_trees
+from tests.support.strands.styled import head
+
+# Style, styles below it, setting, (value in one half, value in the other half).
+CASES = {
+    "clump": (clump.Settings(crossover=0.1), (), "size", (0.05, 0.02)),
+    "three levels": (clump.Settings(levels=3), (), "size", (0.08, 0.03)),
+    "curl below": (clump.Settings(levels=2, tip_level=1), (curl.Settings(),), "size", (0.05, 0.02)),
+    "two clumps": (clump.Settings(levels=1), (clump.Settings(levels=1, size=0.1, seed=3),), "size", (0.05, 0.02)),
+    "braid": (braid.Settings(), (), "size", (0.05, 0.1)),
+    "wet": (wet.Settings(), (), "lock", (0.06, 0.03)),
+}
+
+
+@pytest.fixture(scope="module")
+def hair():
+    return head(200, 30)
+
+
+@pytest.fixture
+def places(hair):
+    """Return a function: (S,) the place of roots from one side of the head to the other [m]."""
+    corners = hair.mesh.vertices[hair.mesh.triangles][..., 0]
+    return lambda roots: (corners[roots.triangle] * roots.barycentric).sum(axis=1)
+
+
+def centre_roots(styling):
+    """Return for each level the roots (S, 4) of the centers of strands, as triangles and barycentric coordinates."""
+    found = []
+    for level, members in zip(styling.levels, styling.data.members.numpy(), strict=False):
+        roots = level.binding.roots[members]
+        found.append(np.concatenate([roots.triangle[:, None], roots.barycentric], axis=1))
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_half_has_the_locks_of_its_own_size(hair, places, name):
+    """Where sizes differ between two halves, each strand has the bits of hair with this strand's size."""
+    style, below, setting, values = CASES[name]
+    number = NumberMap(lambda roots, _ids, _clumps: np.where(places(roots) > 0.0, values[1], values[0]))
+    inputs = Inputs(numbers={(0, setting): number})
+    found = hair.styled(style, *below, inputs=inputs)
+    is_second = places(hair.binding.roots) > 0.0
+    styling = hair.bound(style, *below, inputs=inputs)
+    is_whole = np.ones(len(found), bool)
+    if name == "two clumps":  # the center of a strand's second lock may be in the other half
+        members, centres = styling.data.members.numpy()[1], styling.levels[1].binding.roots
+        is_whole = (places(centres)[members] > 0.0) == is_second
+    for half, value in enumerate(values):
+        same = is_whole & (is_second == half)
+        own = replace(style, **{setting: value}), *below
+        for centres, others in zip(centre_roots(styling), centre_roots(hair.bound(*own)), strict=True):
+            np.testing.assert_array_equal(centres[same], others[same])
+        alone = hair.styled(*own)
+        assert same.sum() > 50 and (found != alone).any()
+        if name != "wet":  # guides and the centers of locks have a size of their own there
+            np.testing.assert_array_equal(found[same], alone[same])
+
+
+def test_one_size_is_the_setting(hair):
+    """Equal sizes of all strands give the tree and the bits of the size, also if the setting has another value."""
+    number = NumberMap(lambda roots, _ids, _clumps: np.full(len(roots), 0.02))
+    style = clump.Settings(size=0.05)
+    found = hair.styled(style, inputs=Inputs(numbers={(0, "size"): number}))
+    np.testing.assert_array_equal(found, hair.styled(replace(style, size=0.02)))
+
+
+def test_many_sizes_are_few_trees(hair, places):
+    """Sizes of a gradient are replaced by few sizes in equal ratios; strands have the nearest."""
+    number = NumberMap(lambda roots, _ids, _clumps: 0.02 + 0.5 * np.abs(places(roots)))
+    style = clump.Settings()
+    tree = varied_trees([style], {(0, "size"): number}, hair.binding)[0]
+    assert len(tree.tree.variants) == MOST_SIZES
+    sizes = number.read(hair.binding.roots, None, None)
+    ratios = tree.sizes[tree.choice(hair.binding, None)] / sizes
+    step = tree.sizes[1] / tree.sizes[0]
+    assert max(ratios.max(), 1.0 / ratios.min()) <= step**0.5 * 1.0001
+    assert np.isfinite(hair.styled(style, inputs=Inputs(numbers={(0, "size"): number}))).all()
