@@ -52,7 +52,7 @@ from .grooms import (
     shade,
 )
 from .guide_layers import add_layer, apply_layers, layers, set_layer
-from .guide_tools import change_guides
+from .guide_tools import change_guides, paint_flow
 from .imports import (
     DerivationSettings,
     MeshStrandSettings,
@@ -114,6 +114,7 @@ __all__ = [
     "make_hair_tubes",
     "maps_of",
     "mesh_to_hair",
+    "paint_flow",
     "points",
     "remove_delivery",
     "render",

@@ -3,16 +3,20 @@
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.errors import HairError
 from ..core.grooming import guide_tool_settings
-from ..core.grooming.guide_tool_settings import CopySettings, ToolSettings
+from ..core.grooming.guide_tool_settings import CopySettings, FlowSettings, ToolSettings
 from ..core.grooming.ties import gather_settings
-from ..core.params import require_class
+from ..core.params import array_of, require_class
 from .arguments import changed, choice
 from .blender_access import blender
 
 Curves = Any
 
-__all__ = ["change_guides"]
+__all__ = ["change_guides", "paint_flow"]
 
 # Tool → its settings.
 TOOLS = {
@@ -67,3 +71,20 @@ def change_guides(
         "GATHER": blender.groom.guides.gathered_guides.gather,
     }
     return functions[tool](target, wanted, depsgraph)
+
+
+def paint_flow(guides: Curves, stroke: ArrayLike, settings: FlowSettings | None = None, **changes: Any) -> int:
+    """Turn guides near a stroke on their surface toward its direction, as the Paint Flow tool does.
+
+    stroke: points (K, 3) on the surface as it is posed, in its local coordinates; settings and changes: as of
+    `change_guides`. Returns the number of turned guides. Raises `HairError`.
+
+    >>> api.paint_flow(guides, [(0.0, 0.0, 0.1), (0.05, 0.0, 0.1)], radius=0.03)
+    12
+    """
+    wanted = changed(FlowSettings, settings, changes)
+    places = array_of(stroke, np.float64)
+    if places is None or places.ndim != 2 or places.shape[1] != 3:
+        raise HairError("A stroke must be an array of points (K, 3).")
+    target, depsgraph = blender.data.arguments.guides_of(guides), blender.data.scene.present_depsgraph()
+    return blender.groom.guides.flow_painting.paint(target, places, wanted, depsgraph)

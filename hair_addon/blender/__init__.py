@@ -13,14 +13,15 @@ from .host import running
 from .live import first_setup, handlers, invalidation
 from .render.frames import engine
 from .render.viewport import viewport
-from .settings import preferences, properties, translations
-from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels, picture_menus
+from .settings import preferences, properties, strokes, translations
+from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels, picture_menus, tools
 
 CLASSES = (
     preferences.VellusPreferences,
     *properties.CLASSES,
     *hair_systems.CLASSES,
     engine.VellusRenderEngine,
+    *strokes.CLASSES,
     *operators.CLASSES,
     *picture_menus.CLASSES,
     *panels.LISTS,
@@ -57,6 +58,7 @@ def register():
     asset_shelf.register()
     engine_panels.register()
     keymap.register()
+    tools.register()
     manual.register()
     handlers.register()
     viewport.register()
@@ -107,6 +109,7 @@ def _unregister():
     handlers.unregister()
     invalidation.clear()
     manual.unregister()
+    tools.unregister()
     keymap.unregister()
     engine_panels.unregister()
     asset_shelf.unregister()

@@ -17,6 +17,7 @@ from hair_addon import api
 from hair_addon.api import guide_tools
 from hair_addon.blender.live import live_hair
 from hair_addon.core.files import settings_file
+from hair_addon.core.grooming import guide_tool_settings
 from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.tables import lookup_tables
@@ -141,6 +142,11 @@ def change_guides(dice):
     return api.change_guides(target(dice, "GUIDES"), anything(dice, tool), **changed)
 
 
+def paint_flow(dice):
+    stroke = anything(dice, [(0.0, 0.0, 1.0), anything(dice, (0.2, 0.0, 1.0), (0.0, 0.0, 1.0))], np.zeros((0, 3)))
+    return api.paint_flow(target(dice, "GUIDES"), stroke, **changes(dice, guide_tool_settings.FlowSettings, ()))
+
+
 def anything(dice, *often):
     return dice.choice(OTHERS + NUMBERS) if dice.random() < 0.15 else dice.choice(often)
 
@@ -218,6 +224,7 @@ CALLS = {
         (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
     ),
     "change_guides": change_guides,
+    "paint_flow": paint_flow,
     "layers": lambda d: api.layers(target(d, "GUIDES")),
     "add_layer": lambda d: api.add_layer(target(d, "GUIDES"), anything(d, "", "Combing")),
     "set_layer": lambda d: api.set_layer(

@@ -29,6 +29,7 @@ from tests.desktop.window import (  # noqa: E402
     viewport,
     wait,
     wait_for,
+    window,
 )
 
 # Tool → settings that the redo panel changes.
@@ -198,10 +199,55 @@ def tools():
         yield from use(name)
 
 
+def paint_flow():
+    """Paint with the Paint Flow tool in Object Mode: a stroke, the redo panel, undo, and a stroke canceled by Esc."""
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.context.view_layer.objects.active = of_kind("HAIR")
+        bpy.ops.wm.tool_set_by_id(name="vellus.paint_flow", space_type="VIEW_3D")
+    yield from wait(0.5)
+    before, followed = guides(), []
+    _area, region = viewport()
+    middle = np.array([region.x + 0.5 * region.width, region.y + 0.5 * region.height])
+    reach = np.array([0.15 * region.height, 0.0])
+    for number, _pause in enumerate(drag(middle - reach, middle + reach)):
+        yield
+        if number == 10:  # the button is still held
+            followed.append(float(np.abs(guides() - before).max()))
+    yield from wait(0.5)
+    after, last = guides(), bpy.context.window_manager.operators[-1]
+    done = facts["flow"] = {"ran": last.bl_idname, "in the stroke": followed, "points": len(last.properties.stroke)}
+    done["changed"] = int((after != before).any(axis=(1, 2)).sum())
+    take_picture(OUT / "flow.png", redraws=2)
+    with in_viewport():
+        bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)
+    done["is the same at once"] = float(np.abs(guides() - after).max())
+    last.properties.strength = 0.0
+    with in_viewport():
+        bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)
+    done["without strength"] = bool(np.array_equal(guides(), before))
+    yield from key("Z", ctrl=True)
+    yield from wait(0.2)
+    done["is undone"] = bool(np.array_equal(guides(), before))
+    stroke = drag(middle - reach, middle + reach)
+    for _event in range(8):
+        next(stroke)
+        yield
+    done["second stroke"] = bool(np.array_equal(guides(), before))
+    yield from key("ESC")
+    yield from wait(0.2)
+    done["is canceled"] = bool(np.array_equal(guides(), before))
+    x, y = (int(value) for value in middle)
+    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
+    yield
+    with in_viewport():
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box", space_type="VIEW_3D")
+
+
 def made_of_it():
     yield from grooms.tubes(of_kind("HAIR"), facts["tubes"])
     yield from grooms.shelf(of_kind("HAIR"), OUT / "library", facts["shelf"])
 
 
 if __name__ == "__main__":
-    take((groom, tools, comb_straight, made_of_it), pause=0.02)
+    take((groom, tools, comb_straight, paint_flow, made_of_it), pause=0.02)

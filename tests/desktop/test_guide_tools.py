@@ -61,3 +61,11 @@ def test_tubes_are_made_after_the_dialog_and_redone(walk):
 def test_a_groom_that_was_saved_is_in_the_shelf_and_a_click_applies_it(walk):
     counts = walk.facts["shelf"]
     assert counts["applied"] == counts["before"] + 1 and counts["undone"] == counts["before"]
+
+
+def test_flow_is_painted_by_the_mouse(walk):
+    """A stroke of the tool turns guides while the mouse moves; it is redone, undone and canceled."""
+    flow = walk.facts["flow"]
+    assert flow["ran"] == "VELLUS_OT_paint_flow" and flow["points"] > 3 and flow["changed"] > 2
+    assert flow["in the stroke"][0] > 0.05 and flow["is the same at once"] < 1e-5
+    assert flow["without strength"] and flow["is undone"] and flow["is canceled"] and not flow["second stroke"]

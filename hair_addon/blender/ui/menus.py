@@ -8,6 +8,7 @@ from ..groom.foreign.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of, surface_of
 from ..live import refused_hair, unlocked_renders
 from ..settings.translations import CONTEXT, interface_text
+from . import tools
 
 # In groups: length and shape, then number and place.
 _GUIDE_TOOLS = (
@@ -34,10 +35,10 @@ _MOST_REFUSALS = 5  # entries listed in a menu
 def draw_guide_tools(layout):
     """Draw a button or menu entry for each tool that changes combed guides."""
     layout.operator_context = "INVOKE_DEFAULT"
-    for place, tools in enumerate(_GUIDE_TOOLS):
+    for place, group in enumerate(_GUIDE_TOOLS):
         if place:
             layout.separator()
-        for name, icon in tools:
+        for name, icon in group:
             layout.operator(f"vellus.{name}", icon=icon)
 
 
@@ -50,6 +51,7 @@ class VELLUS_MT_guide_tools(bpy.types.Menu):
 
     def draw(self, context):
         draw_guide_tools(self.layout)
+        tools.draw_paint_flow(self.layout, context)
 
 
 class VELLUS_MT_unlocked_render(bpy.types.Menu):

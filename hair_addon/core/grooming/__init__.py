@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         hair_styles,
         layer_kernels,
         layer_transfer,
+        painted_flow,
         rooted_curves,
         transfer_settings,
     )

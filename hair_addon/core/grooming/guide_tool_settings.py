@@ -4,6 +4,7 @@
 Their mathematics is in other files, some of which import Warp: too slow for the registration of an add-on.
 """
 
+import math
 from dataclasses import dataclass
 
 from ..params import Settings, param
@@ -135,6 +136,36 @@ class AttractSettings(ToolSettings):
         unit="LENGTH",
         subtype="DISTANCE",
     )
+
+
+@dataclass(frozen=True)
+class FlowSettings(ToolSettings):
+    """Settings for painting the flow of guides."""
+
+    radius: float = param(
+        0.03,
+        "Distance from the stroke within which guides turn; the effect fades toward it",
+        above=0.0,
+        high=1e6,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    strength: float = param(
+        0.5,
+        "How fast guides turn toward the stroke; at 1 those below it turn completely",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    lift: float = param(
+        math.radians(30.0),
+        "Largest angle between the surface and the turned guides; steeper guides are laid down to it",
+        low=0.0,
+        high=math.pi / 2.0,
+        subtype="ANGLE",
+    )
+    mirrored: bool = param(False, "Paint on the other side of the surface too, mirrored along its local X axis")
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from ....core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         brushes,
+        flow_painting,
         frozen_guides,
         gathered_guides,
         guide_additions,

@@ -127,6 +127,15 @@ def pushed_posed(barrier: _Barrier, posed: np.ndarray) -> np.ndarray:
     return found
 
 
+def pushed(guides: CombedGuides, barrier: _Barrier, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return new points (M, P, 3) float32 [m] of chosen guides (M,) pushed outside of the posed surface."""
+    places = guides.of_count(points.shape[1], chosen)
+    local, here = guides.local.copy(), guides.points.copy()
+    here[places] = points
+    local[places] = guides.surface.to_local(points)
+    return _pushed(replace(guides, local=local, points=here), barrier, chosen, places)[0]
+
+
 def _pushed(guides, barrier, chosen, places):
     """Return (points (M, P, 3) float32 [m] at rest outside of the posed surface, (M,) bool: which guides moved)."""
     posed = guides.posed_of(chosen, places)

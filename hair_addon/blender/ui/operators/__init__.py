@@ -4,6 +4,7 @@
 from . import (
     conversion,
     dynamics,
+    flow_painting,
     freezing,
     guide_layers,
     guide_tools,
@@ -23,6 +24,7 @@ SUBJECTS = (
     surface,
     conversion,
     guide_tools,
+    flow_painting,
     guide_layers,
     freezing,
     selection_sets,

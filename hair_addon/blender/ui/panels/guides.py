@@ -12,7 +12,7 @@ from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.guides import guide_states
 from ...groom.selection import guides_of, guides_to_regenerate, surface_of
 from ...settings.translations import interface_text
-from .. import menus, setting_rows
+from .. import menus, setting_rows, tools
 from .tab import HairTab, draw_work, split, write, write_stale, write_status
 
 
@@ -135,6 +135,7 @@ class VELLUS_PT_guides_tools(_OfAnyGuides, bpy.types.Panel):
     bl_idname = "VELLUS_PT_guides_tools"
 
     def draw(self, context):
+        tools.draw_paint_flow(self.layout, context)
         menus.draw_guide_tools(self.layout.column(align=True))
 
 

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Flow painted by a brush: strokes on the posed surface turn the guides near them, as they are drawn or at once."""
+
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object
+
+from ....core import geometry, grooming
+from ....core.errors import HairError
+from ....core.geometry import mesh as mesh_math
+from ....core.grooming.guide_tool_settings import FlowSettings
+from ...data.strands import attributes
+from . import guide_tools, outside_guides
+
+_MIRROR = np.array([-1.0, 1.0, 1.0])  # along the local X axis
+_PROBE = 1e-2  # length of the probe that carries directions to rest, relative to the radius
+_MOST_POINTS = 10_000  # of a stroke
+
+
+class FlowStroke:
+    """A stroke of the brush: guides as they were before, and the effect of the stroke so far.
+
+    Each call of `extend` turns the guides anew from where they were, so a stroke has the same result at once.
+    """
+
+    def __init__(self, datablock: Curves, settings: FlowSettings, depsgraph: Depsgraph) -> None:
+        """Read the guides and their posed surface. Raises `HairError`."""
+        self._guides = guides = guide_tools.read(datablock, settings, depsgraph)
+        self._settings = settings
+        self._mesh = guides.surface.posed_mesh
+        mesh_math.require_finite(self._mesh.vertices)
+        self._query = geometry.closest_point.SurfaceQuery(self._mesh)
+        self._roots = guides.posed()[guides.starts[:-1]]
+        normals = mesh_math.normals(self._mesh, guides.roots)
+        sides = 2 if settings.mirrored else 1
+        values = (self._roots, normals, settings.radius, settings.strength)
+        self._sides = [grooming.painted_flow.PaintedFlow(*values) for _side in range(sides)]
+        self._barrier = outside_guides.prepared(guides, 0.0, ()) if datablock.vellus.keeps_outside else None
+        self._last = None
+
+    def extend(self, stroke: np.ndarray) -> int:
+        """Add points (K, 3) in local coordinates of the posed surface to the stroke; returns the number of turned
+        guides. Raises `HairError`.
+        """
+        stroke = np.asarray(stroke, np.float64).reshape(-1, 3)
+        if not np.isfinite(stroke).all():
+            raise HairError("The stroke has non-finite coordinates: paint again.")
+        if self._last is not None:
+            stroke = np.concatenate([self._last[None], stroke])
+        if len(stroke) > 1:
+            for side, factor in zip(self._sides, (1.0, _MIRROR), strict=False):
+                self._paint(side, self._guides.surface.from_local(stroke * factor))
+        self._last = stroke[-1] if len(stroke) else self._last
+        return self._turn()
+
+    def restore(self) -> None:
+        """Write the guides as they were before the stroke."""
+        guides = self._guides
+        attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", guides.local)
+        guides.datablock.update_tag()
+
+    def _paint(self, side, places):
+        normals = mesh_math.normals(self._mesh, self._query.nearest(0.5 * (places[1:] + places[:-1])))
+        for start, end, normal in zip(places[:-1], places[1:], normals, strict=True):
+            side.extend(start, end, normal)
+
+    def _turn(self):
+        guides, barrier = self._guides, self._barrier
+        first = self._sides[0]
+        directions, shares = first.directions, first.shares
+        if self._settings.mirrored:
+            directions, shares = grooming.painted_flow.joined_flow(*self._sides)
+        shares = shares * guides.weights
+        after = guides.points.copy()
+        for chosen, places in guide_tools.to_shape(guides):
+            is_near = shares[chosen] > 0.0
+            chosen, places = chosen[is_near], places[is_near]
+            if not len(chosen):
+                continue
+            points, normals = guides.points[places], guides.normals[chosen]
+            flow = self._at_rest(directions, chosen)
+            turned = grooming.painted_flow.turned_along(points, normals, flow, shares[chosen], self._settings)
+            after[places] = turned if barrier is None else outside_guides.pushed(guides, barrier, turned, chosen)
+        return guide_tools.write_shapes(guides, after)
+
+    def _at_rest(self, directions, chosen):
+        """Return directions (M, 3) at the posed roots of chosen guides, carried to the surface at rest."""
+        starts = self._roots[chosen].astype(np.float64)
+        reach = _PROBE * self._settings.radius
+        probes = np.stack([starts, starts + reach * directions[chosen]], axis=1).astype(np.float32)
+        carried = self._guides.carried_back(probes, chosen)
+        return grooming.guide_shapes.unit(np.diff(carried.astype(np.float64), axis=1)[:, 0])
+
+
+def paint(datablock: Curves, stroke: np.ndarray, settings: FlowSettings, depsgraph: Depsgraph) -> int:
+    """Turn guides along a stroke (K, 3) in local coordinates of their posed surface; returns the number turned.
+
+    Raises `HairError` before anything changes.
+    """
+    if len(stroke) < 2:
+        raise HairError("The stroke has no length: drag over the surface.")
+    if len(stroke) > _MOST_POINTS:
+        raise HairError("The stroke has {count} points, too many: paint shorter strokes.", count=len(stroke))
+    return FlowStroke(datablock, settings, depsgraph).extend(stroke)
+
+
+def place_on(surface: Object, origin: np.ndarray, direction: np.ndarray, depsgraph: Depsgraph) -> np.ndarray | None:
+    """Return where a ray in world coordinates first meets a posed surface, (3,) in its local coordinates, or None."""
+    to_local = surface.matrix_world.inverted_safe()
+    start = to_local @ origin
+    is_hit, place, _normal, _face = surface.evaluated_get(depsgraph).ray_cast(start, to_local.to_3x3() @ direction)
+    return np.array(place) if is_hit else None

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strokes of the mouse as a property of operators, so that the redo panel repeats them."""
+
+import bpy
+import numpy as np
+
+
+class VellusStrokePoint(bpy.types.PropertyGroup):
+    """A point of a stroke"""
+
+    location: bpy.props.FloatVectorProperty(options={"HIDDEN"})
+
+
+def annotations():
+    """Return {name: bpy property} of an operator with a stroke on a surface."""
+    options = {"HIDDEN", "SKIP_SAVE"}
+    return {"stroke": bpy.props.CollectionProperty(type=VellusStrokePoint, options=options)}
+
+
+def read(operator):
+    """Return the stroke (K, 3) float64 of an operator, in local coordinates of the surface."""
+    return np.array([point.location for point in operator.stroke], np.float64).reshape(-1, 3)
+
+
+def add(operator, place):
+    """Add a point (3,) to the stroke of an operator."""
+    operator.stroke.add().location = place
+
+
+CLASSES = (VellusStrokePoint,)

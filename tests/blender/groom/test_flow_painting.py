@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paint Flow turns guides along strokes on the surface as it is posed, and keeps them outside of it."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hair_addon import api
+from hair_addon.blender.ui import tools
+from hair_addon.core.errors import HairError
+from tests.support.interface.layout import draw, redo_panel
+from tests.support.reading import evaluated_points, points
+
+RADIUS = 0.5
+
+
+@pytest.fixture
+def guides(hair):
+    """Return the guides of the sphere as the active object."""
+    found = bpy.data.objects["Guides"]
+    bpy.context.view_layer.objects.active = found
+    return found
+
+
+def arc(reach=0.7, radius=1.0, side=0.3):
+    """Return points of a stroke over the top of a sphere, from -X to +X, as an operator takes them."""
+    angles = np.linspace(-reach, reach, 15)
+    way = np.stack([np.sin(angles), np.full(15, side), np.cos(angles)], axis=1)
+    return radius * way / np.linalg.norm(way, axis=1, keepdims=True)
+
+
+def paint(stroke, **values):
+    given = [{"name": "", "location": tuple(place)} for place in stroke]
+    settings = {"radius": RADIUS, "strength": 1.0} | values
+    assert bpy.ops.vellus.paint_flow("EXEC_DEFAULT", True, stroke=given, **settings) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    return points(bpy.data.objects["Guides"])
+
+
+def along_x(shape):
+    """Return (G,) cosines between the leans of guides on the sphere and the direction of `arc`."""
+    normals = shape[:, 0].astype(np.float64)
+    lean = shape[:, -1] - normals
+    lean -= np.sum(lean * normals, axis=1, keepdims=True) * normals
+    flow = np.stack([normals[:, 2], np.zeros(len(normals)), -normals[:, 0]], axis=1)
+    return np.sum(lean * flow, axis=1) / np.linalg.norm(lean, axis=1) / np.linalg.norm(flow, axis=1)
+
+
+def segments(shape):
+    return np.linalg.norm(np.diff(shape.astype(np.float64), axis=1), axis=2)
+
+
+def distances(shape, stroke):
+    return np.linalg.norm(shape[:, :1] - stroke[None], axis=2).min(axis=1)
+
+
+def require_painted(before, after, stroke):
+    away = distances(before, stroke)
+    is_near = (away < 0.5 * RADIUS) & (np.abs(before[:, 0, 0]) < 0.45)
+    assert is_near.sum() > 1 and along_x(after)[is_near].min() > 0.9 > along_x(before)[is_near].min()
+    assert (along_x(after) > along_x(before) - 1e-6)[away < RADIUS].all()
+    assert np.array_equal(after[away > RADIUS], before[away > RADIUS])
+    assert np.array_equal(after[:, 0], before[:, 0])
+    np.testing.assert_allclose(segments(after), segments(before), rtol=1e-4, atol=1e-6)
+    assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.993
+
+
+@pytest.mark.parametrize("mode", ["OBJECT", "SCULPT_CURVES"])
+def test_a_stroke_turns_guides_and_is_undone(guides, mode):
+    bpy.ops.object.mode_set(mode=mode)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="Before")
+    before, strands = points(guides), points(bpy.data.objects["Hair"])
+    after = paint(arc())
+    require_painted(before, after, arc())
+    assert not np.array_equal(points(bpy.data.objects["Hair"]), strands)
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(bpy.data.objects["Guides"]), before)
+    bpy.ops.ed.redo()
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(bpy.data.objects["Guides"]), after)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("place", ["moved", "small", "mirrored"])
+def test_strokes_have_the_same_effect_on_transformed_surfaces(guides, place):
+    """In the coordinates of the surface, a stroke turns guides as it does without a transform."""
+    sphere, before = bpy.data.objects["Sphere"], points(guides)
+    alone = paint(arc())
+    bpy.ops.ed.undo()
+    sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
+    scale = {"moved": 1.0, "small": 0.01, "mirrored": 1.0}[place]
+    turn = Matrix.Rotation(0.7, 4, "Z") @ Matrix.Rotation(0.4, 4, "X") if place == "moved" else Matrix.Identity(4)
+    sphere.matrix_world = Matrix.Translation((3.0, 1.0, 2.0) if place == "moved" else (0.0, 0.0, 0.0)) @ turn
+    sphere.scale = (-1.0, 1.0, 1.0) if place == "mirrored" else (scale, scale, scale)
+    bpy.context.view_layer.update()
+    before = points(guides)
+    after = paint(arc(), radius=scale * RADIUS)
+    require_painted(before, after, arc())
+    np.testing.assert_allclose(after, alone, atol=2e-3)
+
+
+def test_strokes_are_painted_on_the_posed_surface(guides):
+    """A stroke on a sphere that a shape key enlarges and turns has its direction in the visible pose."""
+    sphere, before = bpy.data.objects["Sphere"], points(guides)
+    sphere.shape_key_add(name="Basis")
+    key = sphere.shape_key_add(name="Large")
+    for point in key.data:
+        point.co = Matrix.Rotation(np.pi / 2.0, 3, "Z") @ (1.5 * point.co)
+    key.value = 1.0
+    bpy.context.view_layer.update()
+    stroke = arc(radius=1.5)
+    after = paint(stroke)
+    posed = evaluated_points(guides)
+    away = distances(posed, stroke)
+    assert (away < 0.5 * RADIUS).any() and along_x(posed / 1.5)[away < 0.4 * RADIUS].min() > 0.93
+    assert np.array_equal(after[away > RADIUS], before[away > RADIUS])
+    np.testing.assert_allclose(segments(after), segments(before), rtol=1e-4, atol=1e-6)
+    assert np.linalg.norm(posed[:, 1:], axis=2).min() > 1.485
+
+
+def test_mirrored_strokes_paint_both_sides(guides):
+    stroke = arc()[:, [1, 0, 2]] + [0.2, 0.0, 0.0]
+    before = points(guides)
+    after = paint(stroke, mirrored=True)
+    is_changed = (after != before).any(axis=(1, 2))
+    image = stroke * [-1.0, 1.0, 1.0]
+    for side in (stroke, image):
+        assert is_changed[distances(before, side) < 0.5 * RADIUS].all()
+    both = np.minimum(distances(before, stroke), distances(before, image))
+    assert np.array_equal(after[both > RADIUS], before[both > RADIUS])
+
+
+def test_selected_guides_and_layers_take_the_stroke(guides):
+    """The stroke turns only selected guides, and the active layer records it."""
+    api.add_layer(guides)
+    before = points(guides)
+    chosen = before[:, 0, 1] > 0.2
+    selection = guides.data.attributes.new(".selection", "BOOLEAN", "CURVE")
+    selection.data.foreach_set("value", chosen)
+    after = paint(arc())
+    assert np.array_equal(after[~chosen], before[~chosen]) and (after[chosen] != before[chosen]).any()
+    guides.data.vellus.layers[0].weight = 0.0
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(points(guides), before, atol=1e-6)
+
+
+def test_the_api_paints_as_the_operator_does(guides):
+    after = paint(arc())
+    bpy.ops.ed.undo()
+    guides = bpy.data.objects["Guides"]
+    assert api.paint_flow(guides, arc(), radius=RADIUS, strength=1.0) > 3
+    np.testing.assert_allclose(points(guides), after, atol=1e-6)
+    with pytest.raises(HairError, match="The stroke has no length"):
+        api.paint_flow(guides, arc()[:1])
+    with pytest.raises(HairError, match="non-finite"):
+        api.paint_flow(guides, np.full((3, 3), np.nan))
+
+
+def test_the_tool_is_offered_in_its_modes(guides):
+    """The panel, the menu and the toolbar offer the tool, whose header shows the settings of the redo panel."""
+    from bl_ui.space_toolsystem_common import ToolSelectPanelHelper
+
+    toolbar = ToolSelectPanelHelper._tool_class_from_space_type("VIEW_3D")
+    for mode in tools.MODES:
+        flat = ToolSelectPanelHelper._tools_flatten(toolbar._tools[mode])
+        assert tools.PAINT_FLOW in [tool.idname for tool in flat if tool is not None]
+    for cls in ("VELLUS_PT_guides_tools", "VELLUS_MT_guide_tools"):
+        assert "Paint Flow" in draw(getattr(bpy.types, cls)).buttons
+    assert {"radius", "strength", "lift", "mirrored"} <= set(redo_panel("paint_flow").drawn)
