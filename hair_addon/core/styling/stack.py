@@ -161,6 +161,16 @@ class Styling:
         numbers = self.levels[row].binding.identities[1][members]
         return members, np.where(members >= 0, numbers, np.float32(0.0))
 
+    def lock_numbers(self) -> np.ndarray:
+        """Return (S,) float32 random numbers in [0, 1) of the coarsest clumps of the first style that gathers strands.
+
+        -1 for strands without a clump.
+        """
+        if not self.tree_levels:
+            return np.full(len(self.data.identities.numpy()), np.float32(-1.0))
+        members = self.data.members.numpy()[0]
+        return np.where(members >= 0, self.levels[0].binding.identities[1][members], np.float32(-1.0))
+
     def wetness(self) -> np.ndarray | None:
         """Return (S,) float32 in [0, 1]: the wetness of each strand for the shading.
 

@@ -15,6 +15,7 @@ from ...data import scene
 from ...data.strands import curves, frozen_points, gathered_groups
 from ...gpu import drawing, strand_textures
 from ...gpu.programs import scene_programs, uniforms
+from ...groom import bindings
 from ...host.caches import Cache
 from ...host.notices import name_of
 from ...materials import looks
@@ -88,6 +89,8 @@ def _hues_texture(guides):
         return None
     if guides.vellus.guide_colors == "TIE":
         return _numbers_texture(_hues_of_ties(guides))
+    if guides.vellus.guide_colors == "CLUMP":
+        return _texture_of_clumps(guides)
     if guides.vellus.guide_colors != "LENGTH":
         return None
     starts, points = curves.curve_offsets(guides), curves.read_points(guides)
@@ -96,6 +99,24 @@ def _hues_texture(guides):
         hues = _hues_of_lengths(geometry.strands.ragged_lengths(points, starts))
         known = hue_cache.keep(guides.session_uid, (source, _numbers_texture(hues)))
     return known[1]
+
+
+def _texture_of_clumps(guides):
+    """Return a texture with the hues of `_hues_of_clumps` for the first hair that follows the guides and has clumps."""
+    bound = next(filter(_has_clumps, map(bindings.of, curves.followers(guides))), None)
+    if bound is None:
+        return _numbers_texture(np.full(len(guides.curves), -1.0))
+    numbers = bound.styles.styling.lock_numbers()
+    nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
+    source, known = (numbers.tobytes(), nearest.tobytes()), hue_cache.get(guides.session_uid)
+    if known is None or known[0] != source:
+        hues = _hues_of_clumps(len(guides.curves), numbers, nearest)
+        known = hue_cache.keep(guides.session_uid, (source, _numbers_texture(hues)))
+    return known[1]
+
+
+def _has_clumps(bound):
+    return bound is not None and bound.styles.clumps is not None
 
 
 def _numbers_texture(values):
@@ -119,6 +140,21 @@ def _hues_of_ties(guides):
     if groups is None:
         return np.full(len(guides.curves), -1.0)
     return np.where(groups > 0, groups * _GOLDEN % 1.0, -1.0)
+
+
+def _hues_of_clumps(guide_count, numbers, nearest):
+    """Return hues (G,), a random hue for each clump; -1 for guides without a clump, which have the plain color.
+
+    A guide belongs to the clump of most of the strands that it is nearest to. numbers: (S,) in [0, 1), -1 for strands
+    without a clump; nearest: (S,) guides of strands, -1 for none.
+    """
+    hues = np.full(guide_count, -1.0)
+    is_valid = (numbers >= 0.0) & (nearest >= 0) & (nearest < guide_count)
+    pairs = np.stack([nearest[is_valid], numbers[is_valid].astype(np.float64)], axis=1)
+    clumps, counts = np.unique(pairs, axis=0, return_counts=True)
+    for guide, hue in clumps[np.argsort(counts, kind="stable")]:  # the largest count comes last
+        hues[int(guide)] = hue
+    return hues
 
 
 def _color_of(guides):

@@ -6,9 +6,11 @@ import gpu
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves, frozen_points, gathered_groups
 from hair_addon.blender.gpu import drawing
+from hair_addon.blender.groom import bindings
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import guide_lines
 from hair_addon.core.geometry import strands
@@ -150,6 +152,26 @@ def test_guides_of_a_tie_share_a_color(guides):
     groups = np.arange(count) % 3
     gathered_groups.write(guides.data, gathered_groups.Gathered(groups, np.zeros(count, np.float32)))
     assert len(hues(plain)) < len(hues(read(guides))) and abs(read(guides) - plain).max() > 0.05
+
+
+def test_guides_of_a_clump_share_a_color(guides):
+    """Guides have a color for each clump of their hair, the clump of most of their strands; without, the plain one."""
+    guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "PLAIN"
+    plain = read(guides)
+    guides.data.vellus.guide_colors = "CLUMP"
+    np.testing.assert_array_equal(read(guides), plain)
+    hair = api.interpolate_hair(guides, strand_count=400)
+    api.add_style(hair, "CLUMP", size=0.8)
+    bpy.context.view_layer.update()
+    numbers = bindings.of(hair).styles.styling.lock_numbers()
+    nearest = bindings.of(hair).binding.guide_weights.indices.numpy()[:, 0]
+    found = guide_lines._hues_of_clumps(len(guides.data.curves), numbers, nearest)
+    for guide in np.unique(nearest):
+        own = list(numbers[nearest == guide])
+        assert own.count(found[guide]) == max(map(own.count, own))
+    assert 3 < len(np.unique(found)) < 0.6 * len(found)
+    colored = read(guides)
+    assert abs(colored - plain).max() > 0.05 and len(hues(plain)) < len(hues(colored))
 
 
 def hues(picture):
