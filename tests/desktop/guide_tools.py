@@ -204,6 +204,8 @@ def paint_flow():
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")
         bpy.context.view_layer.objects.active = of_kind("HAIR")
+        of_kind("GUIDES").data.attributes.remove(of_kind("GUIDES").data.attributes[".selection"])
+        bpy.ops.ed.undo_push(message="Deselected")
         bpy.ops.wm.tool_set_by_id(name="vellus.paint_flow", space_type="VIEW_3D")
     yield from wait(0.5)
     before, followed = guides(), []
