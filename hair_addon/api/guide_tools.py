@@ -79,8 +79,8 @@ def paint_flow(guides: Curves, stroke: ArrayLike, settings: FlowSettings | None 
     stroke: points (K, 3) on the surface as it is posed, in its local coordinates; settings and changes: as of
     `change_guides`. Returns the number of turned guides. Raises `HairError`.
 
-    >>> api.paint_flow(guides, [(0.0, 0.0, 0.1), (0.05, 0.0, 0.1)], radius=0.03)
-    12
+    >>> guides = bpy.data.objects["Guides"]
+    >>> turned = api.paint_flow(guides, [(0.0, 0.0, 0.1), (0.05, 0.0, 0.1)], radius=0.03)
     """
     wanted = changed(FlowSettings, settings, changes)
     places = array_of(stroke, np.float64)

@@ -220,6 +220,8 @@ def paint_flow():
     after, last = guides(), bpy.context.window_manager.operators[-1]
     done = facts["flow"] = {"ran": last.bl_idname, "in the stroke": followed, "points": len(last.properties.stroke)}
     done["changed"] = int((after != before).any(axis=(1, 2)).sum())
+    tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties("vellus.paint_flow")
+    done["radius"] = tool.radius / last.properties.radius
     take_picture(OUT / "flow.png", redraws=2)
     with in_viewport():
         bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)

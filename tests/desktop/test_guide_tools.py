@@ -68,4 +68,5 @@ def test_flow_is_painted_by_the_mouse(walk):
     flow = walk.facts["flow"]
     assert flow["ran"] == "VELLUS_OT_paint_flow" and flow["points"] > 3 and flow["changed"] > 2
     assert flow["in the stroke"][0] > 0.05 and flow["is the same at once"] < 1e-5
+    assert flow["radius"] == pytest.approx(1.0)
     assert flow["without strength"] and flow["is undone"] and flow["is canceled"] and not flow["second stroke"]

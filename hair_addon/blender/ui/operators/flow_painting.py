@@ -12,6 +12,7 @@ from ...groom.selection import guides_of
 from ...settings import setting_properties, strokes
 from .guide_tools import GuideTool
 
+_TOOL = "vellus.paint_flow"
 _PART = 0.12  # default radius as a fraction of the size of the surface
 _SPACING = 0.05  # least distance between points of a stroke, relative to the radius
 
@@ -38,6 +39,9 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
         if place is None:
             return {"PASS_THROUGH"}
         self.prefill(guides)
+        tool = context.workspace.tools.from_space_view3d_mode(context.mode)
+        if tool is not None and tool.idname == _TOOL:
+            tool.operator_properties(_TOOL).radius = self.radius  # shown in the header
         self.stroke.clear()
         try:
             with memory_as_sentence():
