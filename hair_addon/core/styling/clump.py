@@ -62,6 +62,7 @@ class Settings(ProfiledSettings):
         high=0.9,
         subtype="FACTOR",
         is_structural=True,
+        may_vary=True,
     )
     fine_amount: float = param(
         0.8,
@@ -88,6 +89,7 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
         is_structural=True,
+        may_vary=True,
     )
     stray: float = param(
         0.03, "Part of the strands that joins no lock", low=0.0, high=1.0, subtype="FACTOR", may_vary=True

@@ -8,7 +8,7 @@ locks consist of whole smaller locks. Strands and sites in a region without site
 
 import math
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,8 @@ class ClumpTrees:
         if tree not in self._levels and tree.variants:
             found = [self.levels(variant, progress) for variant in tree.variants]
             self._levels[tree] = [self._joined(levels) for levels in zip(*found, strict=True)]
+        elif tree not in self._levels and (known := self._of_same_sites(tree)) is not None:
+            self._levels[tree] = known
         elif tree not in self._levels:
             counts = self.site_counts(tree)
             ends = [0.0, *(sum(counts[: level + 1]) / sum(counts) for level in range(len(counts)))]
@@ -73,6 +75,12 @@ class ClumpTrees:
         else:
             self._levels[tree] = self._levels.pop(tree)  # most recently used
         return self._levels[tree]
+
+    def _of_same_sites(self, tree):
+        """Return the known levels of a tree with the same sites and another crossover; None if there is none."""
+        alike = (known for known in self._levels if replace(known, crossover=tree.crossover) == tree)
+        known = next(alike, None)
+        return None if known is None else self._levels[known]
 
     def _joined(self, bindings):
         """Return the `HairBinding` of the centers of a level of several trees, one after the other."""

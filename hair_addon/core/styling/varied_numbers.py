@@ -6,9 +6,11 @@ one equation, and an array of equal values gives the bits of the value.
 
 Where sizes of locks differ, each size has a clump tree of its own over the whole surface, and a strand belongs to locks
 of the tree of its own size. So locks of one size are where they are in hair with this size everywhere. More than
-`MOST_SIZES` sizes are replaced by as many sizes in equal ratios.
+`MOST_SIZES` sizes are replaced by as many sizes in equal ratios. Other numbers of clump trees are treated alike.
 """
 
+import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -95,55 +97,70 @@ def _ordered(step, values, cutters):
 
 
 @dataclass(frozen=True, eq=False)
-class VariedTree:
-    """The tree of a style whose size of locks differs between strands.
-
-    number: the sizes of strands; sizes: (N,) [m] of the trees, rising; tree: with these trees as variants.
-    """
+class _Structural:
+    """A number that changes a clump tree: its map, and the values (N,) that have trees, rising."""
 
     number: NumberMap
-    sizes: np.ndarray
+    values: np.ndarray
+    is_length: bool
+
+    def nearest(self, binding, clumps):
+        """Return the index (S,) of the value nearest to that of each strand; lengths are compared by their ratio."""
+        lower, upper = self.values[:-1], self.values[1:]
+        borders = np.sqrt(lower * upper) if self.is_length else 0.5 * (lower + upper)
+        return np.searchsorted(borders, self.number.read(binding.roots, binding.identities[0], clumps))
+
+
+@dataclass(frozen=True, eq=False)
+class VariedTree:
+    """The tree of a style whose locks differ in size between strands.
+
+    parts: its numbers; tree: with a variant for each combination of their values, the last number first.
+    """
+
+    parts: tuple[_Structural, ...]
     tree: TreeSettings
 
     def choice(self, binding: HairBinding, clumps: np.ndarray | None) -> np.ndarray:
-        """Return (S,) the variant of each strand: the nearest size by ratio; clumps: as of `NumberMap`."""
-        return _nearest(self.number.read(binding.roots, binding.identities[0], clumps), self.sizes)
+        """Return (S,) the variant of each strand; clumps: as of `NumberMap`."""
+        found = np.zeros(len(binding.roots), int)
+        for part in self.parts:
+            found = found * len(part.values) + part.nearest(binding, clumps)
+        return found
 
 
 def varied_trees(
     styles: Sequence[StyleSettings], numbers: Mapping[tuple[int, str], NumberMap], binding: HairBinding
 ) -> dict[int, VariedTree]:
-    """Return {index of the style: its `VariedTree`} of styles whose size of locks differs between bound strands."""
+    """Return {index of the style: its `VariedTree`} of styles whose locks differ in size between bound strands."""
     found = {}
     for place, settings in enumerate(styles):
         base = program.tree_settings(settings) if has_effect(settings) else None
-        name = next((name for its, name in numbers if its == place and _is_size(settings, name)), None)
-        if base is None or name is None:
+        known = [details for details in declared(type(settings)) if details[2].is_structural]
+        varied = {name: numbers[place, name] for name, _default, _details in known if (place, name) in numbers}
+        if base is None or not varied or not len(binding.roots):
             continue
-        number = numbers[place, name]
-        sizes = _distinct(number.read(binding.roots, binding.identities[0], None))
-        if not len(sizes):
-            continue
-        trees = (program.tree_settings(replace(settings, **{name: size})) for size in sizes.tolist())
+        lengths = [details.unit == "LENGTH" for name, _default, details in known if name in varied]
+        read = [number.read(binding.roots, binding.identities[0], None) for number in varied.values()]
+        values = _values_of_trees(read, lengths)
+        parts = tuple(map(_Structural, varied.values(), values, lengths))
+        combinations = itertools.product(*(each.tolist() for each in values))
+        changed = (replace(settings, **dict(zip(varied, chosen, strict=True))) for chosen in combinations)
+        trees = (program.tree_settings(each) for each in changed)
         variants = tuple(tree for tree in trees if tree is not None)
         tree = variants[0] if len(variants) == 1 else replace(base, variants=variants)
-        found[place] = VariedTree(number, sizes, tree)
+        found[place] = VariedTree(parts, tree)
     return found
 
 
-def _is_size(settings, name):
-    return any(its == name and details.is_structural for its, _default, details in declared(type(settings)))
-
-
-def _distinct(values):
-    """Return at most `MOST_SIZES` of (S,) values, rising."""
-    found = np.unique(values)
-    if len(found) <= MOST_SIZES:
+def _values_of_trees(read, lengths):
+    """Return the values of each number, rising, with at most `MOST_SIZES` combinations; read: [(S,)] of strands."""
+    found = [np.unique(values) for values in read]
+    if math.prod(map(len, found)) <= MOST_SIZES:
         return found
-    return np.geomspace(found[0], found[-1], MOST_SIZES)
-
-
-def _nearest(values, sizes):
-    """Return the indices (S,) of the sizes (N,) with the ratios to values (S,) nearest to one."""
-    borders = np.sqrt(sizes[1:] * sizes[:-1])
-    return np.searchsorted(borders, values)
+    most = max(int(MOST_SIZES ** (1.0 / len(found)) + 1e-9), 2)
+    spaced = (np.geomspace if is_length else np.linspace for is_length in lengths)
+    return [
+        space(values[0], values[-1], most) if len(values) > most else values
+        for space, values in zip(spaced, found, strict=True)
+    ]
