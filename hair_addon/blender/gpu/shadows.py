@@ -6,7 +6,7 @@ from dataclasses import replace
 import gpu
 import numpy as np
 
-from . import drawing, surface_textures
+from . import drawing, strand_batches, surface_textures
 from .programs import scene_programs, shadow_programs, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
@@ -52,6 +52,7 @@ class ShadowMaps:
         self._sphere = None  # bounding sphere that the maps were last aimed at
         self._views = {}  # index of a light outside of the hair → (inputs of `_aim`, view, members that it wrote)
         self._surfaces = {}  # layer → inputs that its surfaces were drawn with
+        self._linked = (), []  # surfaces that were drawn last, and the same joined
         self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands
         # Targets of drawing, which are then filtered into a map.
         self._surface_depth = _array(size, 1, "RG32F")  # depth and color of surfaces
@@ -92,9 +93,12 @@ class ShadowMaps:
                 view["light_index"] = index
                 views[index] = view
         if views:
-            light_block = uniforms.uniform_buffer(lights)  # each map only reads its own light
+            light_block, linked = uniforms.uniform_buffer(lights), _linked(hair)  # each map only reads its own light
             for index, view in views.items():
-                cast = (hair, surfaces) if casters is None else casters(index)
+                cast = (linked, surfaces)
+                if casters is not None:
+                    casting, blocking = casters(index)
+                    cast = _linked(casting), blocking
                 self._draw_light(index, view, lights, light_block, *cast, steps, is_steady)
 
     def _aimed(self, index, light, hair, loose):
@@ -116,9 +120,9 @@ class ShadowMaps:
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
 
-    def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps, is_steady):
+    def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady):
         hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
-        placed = [(strands, _record(strands, view, to_world, steps, is_steady)) for strands, to_world in hair]
+        placed = [(strands, _records(strands, view, to_world, steps, is_steady)) for strands, to_world in linked]
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:
@@ -163,27 +167,47 @@ class ShadowMaps:
             drawing.gpu_state("LESS_EQUAL", depth_writes=True),
         ):
             light_block = uniforms.uniform_buffer(lights)
-            for surface in surfaces:
-                surface_textures.draw_depth(surface, view, light_block)
+            for surface in self._linked_surfaces(tuple(surfaces)):
+                if isinstance(surface, surface_textures.LinkedSurfaces):
+                    surface.draw_depth(view, light_block)
+                else:
+                    surface_textures.draw_depth(surface, view, light_block)
         self._blur(layer, _blur_of(light, self._size))
         self._surfaces[layer] = drawn_with
         return True
 
+    def _linked_surfaces(self, surfaces):
+        """Return `surface_textures.linked` surfaces, which are the same for most lights."""
+        if self._linked[0] != surfaces:
+            self._linked = surfaces, surface_textures.linked(surfaces, has_color=True)
+        return self._linked[1]
+
     def _walk(self, layer, placed, lights, hidden):
-        """Draw a map of strands by compute programs, with integer sums that do not depend on the order."""
+        """Draw a map of strands by compute programs, with integer sums that do not depend on the order.
+
+        placed: [(StrandsOnGPU, (N,) records)].
+        """
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         if not self._is_empty:
             self._clear_ends()
             self._counts.clear(format="UINT", value=(0,))
         self._is_empty = False
-        placed = [(*one, {"view": uniforms.uniform_buffer(one[1]), "lights": lights}) for one in placed]
-        fronts, counts = map(scene_programs.strand_shadow_program, (True, False))
-        for strands, record, blocks in placed:
-            drawing.rasterize_strands(strands, fronts, record, blocks, samplers, images, {})
-        self._fill_fronts(layer)
-        for strands, record, blocks in placed:
-            drawing.rasterize_strands(strands, counts, record, blocks, samplers, images, {})
+        placed = [
+            (strands, records[0], strand_batches.objects_of(records), uniforms.uniform_buffer(records[0]))
+            for strands, records in placed
+        ]
+        for is_front in (True, False):
+            for strands, record, objects, view in placed:
+                program = scene_programs.strand_shadow_program(is_front, objects is not None)
+                if objects is None:
+                    blocks = {"view": view, "lights": lights}
+                    drawing.rasterize_strands(strands, program, record, blocks, samplers, images, {})
+                else:
+                    blocks = {"shared_view": view, "lights": lights}
+                    objects.rasterize(strands, program, blocks, samplers, images, {})
+            if is_front:
+                self._fill_fronts(layer)
         self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
         self._is_empty = True
 
@@ -192,7 +216,8 @@ class ShadowMaps:
         self._backs.clear(format="UINT", value=(0,))
 
     def _draw_strips(self, layer, placed, lights, hidden):
-        """Draw a map of strands as triangle strips."""
+        """Draw a map of strands as triangle strips; placed: as for `_walk`."""
+        each = [(strands, record) for strands, records in placed for record in records]
         self._clear_ends()
         end = scene_programs.strip_program(
             "shadows/shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden)
@@ -202,14 +227,14 @@ class ShadowMaps:
             target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self._depth)
             with target.bind(), drawing.gpu_state(test, depth_writes=True):
                 target.clear(depth=depth)
-                for strands, record in placed:
+                for strands, record in each:
                     drawing.draw_strip(strands, end, record, lights, hidden)
         self._fill_fronts(layer)
         with (
             self._target(self._hair_layers, layer),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
-            for strands, record in placed:
+            for strands, record in each:
                 drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front, **hidden})
 
     def _fill_fronts(self, layer):
@@ -258,18 +283,26 @@ def _slot(texture, layer):
     return texture if layer is None else {"texture": texture, "layer": layer}
 
 
-def _record(strands, view, to_world, steps, is_steady):
-    """`drawing.strand_record` of strands, thickened to compensate for the length that fewer points lose.
+def _linked(hair):
+    """Return [(StrandsOnGPU, (N, 4, 4) object to world)] of hair that shares strands; hair: [(StrandsOnGPU, object to
+    world)].
+    """
+    groups = strand_batches.groups_of(id(strands) for strands, _to_world in hair)
+    return [(hair[group[0]][0], np.stack([hair[index][1] for index in group])) for group in groups]
+
+
+def _records(strands, view, to_world, steps, is_steady):
+    """`drawing.strand_records` of strands, thickened to compensate for the length that fewer points lose.
 
     Strands at rest are drawn with the fewest points that show them.
     """
     if steps.point_count is None and not is_steady:
         steps = replace(steps, point_count=strands.points_that_show(_LENGTHENING))
-    record = drawing.strand_record(strands, view, to_world, steps)
-    drawn_points = int(record["drawn_points"])
+    records = drawing.strand_records(strands, view, to_world, steps)
+    drawn_points = int(records["drawn_points"][0])
     if drawn_points < strands.point_count:
-        record["thickness"] *= strands.lengthening(drawn_points)
-    return record
+        records["thickness"] *= strands.lengthening(drawn_points)
+    return records
 
 
 def _array(size, layer_count, texture_format):

@@ -97,7 +97,7 @@ class Objects:
         )
         self.count, self.last_segment = len(records), first + strand_count * (points - 1) - 1
 
-    def rasterize(self, strands, program, blocks, samplers, images, constants, part):
+    def rasterize(self, strands, program, blocks, samplers, images, constants, part=drawing.WALK_ALL):
         """Run a compute program that rasterizes the segments of all objects: `drawing.rasterize_strands`."""
         if not self._group_counts[part]:
             return
@@ -107,6 +107,11 @@ class Objects:
             for name, value in (constants | {"object_count": self.count, "walked_part": part}).items():
                 program.uniform_int(name, value)
             run_for_each(program, int(self._group_counts[part]), 1)
+
+
+def objects_of(records):
+    """Return the `Objects` of (N,) records for a shadow map; None for a single object."""
+    return None if len(records) == 1 else Objects(records, np.zeros(len(records)), 0)
 
 
 def _halves(numbers):

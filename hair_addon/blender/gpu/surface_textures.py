@@ -229,10 +229,12 @@ class LinkedSurfaces:
         texels[: self._count] = self.to_world.transpose(0, 2, 1)
         self._transforms = driver_textures.new_texture((4 * _ROW_TRANSFORMS, row_count), "RGBA32F", texels)
 
-    def draw_depth(self, view, light_block, fragment, clip_planes=None):
-        """`draw_depth` of all surfaces, for a fragment shader without colors."""
+    def draw_depth(self, view, light_block, fragment=_COLORED, clip_planes=None):
+        """`draw_depth` of all surfaces; their color is that of their first part."""
         program = surface_programs.depth_program(fragment, clip_planes is not None, is_linked=True)
-        blocks = {"view": uniforms.uniform_buffer(view), "lights": light_block}
+        placed = self._first.placed(view)
+        placed["surface_color"] = self._first.corners.colors[0][1]
+        blocks = {"view": uniforms.uniform_buffer(placed), "lights": light_block}
         textures = {"places": self._first.places, "transforms": self._transforms}
         with drawing.bound(program, blocks | uniforms.clipping_blocks(clip_planes), textures):
             self._first.corners.triangles.draw_instanced(program, instance_start=0, instance_count=self._count)
@@ -245,9 +247,15 @@ class LinkedSurfaces:
             self._first.corners.bare.draw_instanced(program, instance_start=0, instance_count=self._count)
 
 
-def linked(surfaces):
-    """Return [`SurfaceOnGPU` or `LinkedSurfaces`]: surfaces with the same data are joined."""
-    groups = linked_groups(surfaces, [None] * len(surfaces))
+def linked(surfaces, has_color=False):
+    """Return [`SurfaceOnGPU` or `LinkedSurfaces`]: surfaces with the same data are joined; has_color: unless they have
+    several colors.
+    """
+    keys = [
+        index if has_color and len({color for _count, color in surface.corners.colors}) > 1 else None
+        for index, surface in enumerate(surfaces)
+    ]
+    groups = linked_groups(surfaces, keys)
     chosen = [[surfaces[index] for index in group] for group in groups]
     return [group[0] if len(group) == 1 else LinkedSurfaces(group) for group in chosen]
 

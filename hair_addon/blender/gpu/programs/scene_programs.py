@@ -129,11 +129,15 @@ def segments_program(is_depth, is_round, is_clipped=False, is_batch=False):
 
 
 @cached
-def strand_shadow_program(is_front):
-    """Return the compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp."""
+def strand_shadow_program(is_front, is_batch=False):
+    """Return the compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp.
+
+    is_batch: of linked hair objects.
+    """
     images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
     defined = {"IS_FRONT": is_front, "IS_ROUND": False}
-    return _walk("shadows/strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
+    options = {"shadow_samplers": ("hair_front",), "samplers": samplers, "is_batch": is_batch}
+    return _walk("shadows/strand_shadow.comp", images, defined, **options)
 
 
 def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False, is_batch=False):
