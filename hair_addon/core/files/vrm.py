@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import HairError
 from . import glb
-from .gltf_springs import below
+from .gltf_springs import below, matrices
 
 NAME = "VRMC_vrm"
 _LICENSE = "https://vrm.dev/licenses/1.0/"
@@ -32,6 +34,23 @@ _OTHERS_OF_SIDES = {
     "Shoulder": ("shoulder", "clavicle"),
     "Toes": ("toes", "toe", "toebase", "ball"),
     "Eye": ("eye",),
+}
+
+# The parent of each bone, without sides; if a humanoid lacks it, the parent of the parent.
+_PARENTS = {
+    "spine": "hips",
+    "chest": "spine",
+    "neck": "chest",
+    "head": "neck",
+    "Eye": "head",
+    "Shoulder": "chest",
+    "UpperArm": "Shoulder",
+    "LowerArm": "UpperArm",
+    "Hand": "LowerArm",
+    "UpperLeg": "hips",
+    "LowerLeg": "UpperLeg",
+    "Foot": "LowerLeg",
+    "Toes": "Foot",
 }
 
 
@@ -97,8 +116,51 @@ def add(path: Path, armature: str, bones: dict[str, str], title: str) -> None:
     lost = [name for name in bones.values() if name not in found]
     if lost:
         raise HairError("The exporter left out bones of the humanoid: {names}.", names=", ".join(lost))
-    glb.add_extension(described, NAME, extension({bone: found[name] for bone, name in bones.items()}, title))
+    places = {bone: found[name] for bone, name in bones.items()}
+    connect(described, places)
+    glb.add_extension(described, NAME, extension(places, title))
     glb.write(path, described, chunks)
+
+
+def connect(described: dict[str, Any], bones: dict[str, int]) -> None:
+    """Move nodes of bones below those of their parents in a glTF file, in place; bones: {bone of VRM: index of its
+    node}.
+
+    VRM requires this order, which deforming bones of a rig with controls may lack. Nodes stay in their places at rest;
+    animations of moved nodes are removed, as they are relative to other parents.
+    """
+    nodes, moved = described["nodes"], set()
+    to_scene = matrices(nodes)
+    for bone in bones:
+        above = _parent_of(bone)
+        while above and above not in bones:
+            above = _parent_of(above)
+        if not above or bones[bone] in below(nodes, bones[above]) or bones[above] in below(nodes, bones[bone]):
+            continue
+        node, parent = bones[bone], bones[above]
+        for one in nodes:
+            if node in (one.get("children") or []):
+                one["children"].remove(node)
+                if not one["children"]:
+                    del one["children"]
+        nodes[parent].setdefault("children", []).append(node)
+        for name in ("translation", "rotation", "scale"):
+            nodes[node].pop(name, None)
+        nodes[node]["matrix"] = (np.linalg.inv(to_scene[parent]) @ to_scene[node]).T.ravel().tolist()
+        moved.add(node)
+    for animation in described.get("animations", []):
+        animation["channels"] = [one for one in animation["channels"] if one["target"].get("node") not in moved]
+    if "animations" in described:
+        described["animations"] = [one for one in described["animations"] if one["channels"]]
+        if not described["animations"]:
+            del described["animations"]
+
+
+def _parent_of(bone):
+    """Return the parent of a bone of VRM, "" for the hips."""
+    side = next((side for side in ("left", "right") if bone.startswith(side)), "")
+    above = _PARENTS.get(bone.removeprefix(side), "")
+    return side + above if above[:1].isupper() else above
 
 
 def extension(bones: dict[str, int], title: str) -> dict[str, Any]:
