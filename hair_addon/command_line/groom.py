@@ -29,7 +29,7 @@ _OF_GROWTH = [s for s in (*declared(GuideSettings), *declared(HairSettings)) if 
 def add(verbs):
     """Add the command's options."""
     parser = verbs.add_parser("groom", help="grow guides and hair on a mesh")
-    parser.add_argument("input", help="file with the mesh: .blend .obj .ply .stl .glb .gltf .usd* .abc")
+    parser.add_argument("input", help="file with the mesh: .blend .obj .ply .stl .glb .gltf .vrm .fbx .usd* .abc")
     parser.add_argument("--out", required=True, help=".blend, .usd*, .abc, or .npz with the arrays")
     parser.add_argument("--surface", default="", metavar="NAME", help="mesh object; needed if the file has several")
     curve_options.add_axis(parser)

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 from functools import partial
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -15,6 +16,13 @@ from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, large
 from tests.support.pairs import pairs, share_of
 
 SMALL = ("--guides", 5, "--strands", 20)
+
+
+def _vrm(filepath):
+    """Write a binary glTF file with the ending of VRM, which the exporter would replace."""
+    partial_path = Path(filepath).with_suffix(".glb")
+    bpy.ops.export_scene.gltf(filepath=str(partial_path))
+    partial_path.replace(filepath)
 
 
 @pytest.fixture
@@ -34,6 +42,8 @@ def mesh(scene, tmp_path):
             ".ply": bpy.ops.wm.ply_export,
             ".stl": bpy.ops.wm.stl_export,
             ".glb": bpy.ops.export_scene.gltf,
+            ".vrm": _vrm,
+            ".fbx": bpy.ops.export_scene.fbx,
             ".gltf": partial(bpy.ops.export_scene.gltf, export_format="GLTF_SEPARATE"),
             ".usdc": bpy.ops.wm.usd_export,
             ".usda": bpy.ops.wm.usd_export,
@@ -69,7 +79,7 @@ def test_missing_and_unsupported_files_are_refused(tmp_path, verb):
     refuse(tmp_path / "none", "a format that Vellus cannot read", verb=verb)
 
 
-ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".usdc", ".usda", ".usdz", ".abc"]
+ENDINGS = [".blend", ".obj", ".ply", ".stl", ".glb", ".gltf", ".vrm", ".fbx", ".usdc", ".usda", ".usdz", ".abc"]
 
 
 @pytest.mark.parametrize("ending", share_of(ENDINGS, 2))

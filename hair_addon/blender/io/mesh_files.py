@@ -3,6 +3,7 @@
 
 import contextlib
 import io
+import re
 from pathlib import Path
 
 import bpy
@@ -44,6 +45,10 @@ def _import_alembic(path, _up):
     return bpy.ops.wm.alembic_import(filepath=path, as_background_job=False)
 
 
+def _import_fbx(path, _up):
+    return bpy.ops.wm.fbx_import(filepath=path)
+
+
 def _axes(up):
     return {"forward_axis": "Y", "up_axis": "Z"} if up == "Z" else {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"}
 
@@ -55,12 +60,20 @@ _FORMATS = {
     ".stl": (_import_stl, "wm.stl_import", mesh_checks.require_stl),
     ".glb": (_import_gltf, "import_scene.gltf", None),
     ".gltf": (_import_gltf, "import_scene.gltf", None),
+    ".vrm": (_import_gltf, "import_scene.gltf", None),  # a binary glTF file
+    ".fbx": (_import_fbx, "wm.fbx_import", None),
     **dict.fromkeys((".usd", ".usdc", ".usda", ".usdz"), (_import_usd, "wm.usd_import", mesh_checks.require_usd)),
     ".abc": (_import_alembic, "wm.alembic_import", mesh_checks.require_alembic),
 }
 
 # Formats whose importers can crash Blender on damaged files despite all checks.
-_MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".glb", ".gltf"}
+_MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".glb", ".gltf", ".vrm", ".fbx"}
+
+# The property UpAxis of an FBX file, binary or text, and the part of the file that contains it. 1 is Y, 2 is Z.
+_FBX_UP = re.compile(
+    rb'UpAxisS\x03\0\0\0intS\x07\0\0\0IntegerS\0\0\0\0I(....)|"UpAxis", *"int", *"Integer", *"", *(\d)', re.DOTALL
+)
+_FBX_START = 1 << 20  # bytes
 
 # Files without axes and units: read in meters.
 _WITHOUT_UP_AXIS = {".obj", ".ply", ".stl"}
@@ -153,7 +166,11 @@ def _open_blend(path, runs_scripts):
 
 
 def _is_y_up(path, ending):
-    """Whether Y points up: always in glTF by specification and in Alembic by convention; USD files store it."""
+    """Whether Y points up: always in glTF by specification and in Alembic by convention; USD and FBX files store it."""
+    if ending == ".fbx":
+        with path.open("rb") as file:
+            stored = _FBX_UP.search(file.read(_FBX_START))
+        return stored is None or (stored[1] or stored[2])[:1] in (b"1", b"\x01")
     if not ending.startswith(".usd"):
         return True
     bpy.utils.expose_bundled_modules()

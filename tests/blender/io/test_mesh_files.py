@@ -141,6 +141,17 @@ def blend(path):
     return (VERTICES + MOVED) * 0.01
 
 
+def fbx(forward, up):
+    def write(path):
+        """Write FBX with Blender, whose unit is the centimeter there."""
+        build(1.0)
+        bpy.ops.export_scene.fbx(filepath=str(path), axis_forward=forward, axis_up=up)
+        x, y, z = (VERTICES + MOVED).T
+        return np.stack([x, z, -y] if up == "Y" else [x, y, z], axis=1)
+
+    return write
+
+
 def alembic(path):
     """Write Alembic with Blender, which uses Y up."""
     build(1.0)
@@ -160,6 +171,9 @@ FILES = {
     "stl as text": ("a.stl", stl_text, Z, ()),
     "gltf": ("a.gltf", gltf, Y, ()),
     "glb": ("a.glb", glb, Y, ()),
+    "vrm": ("a.vrm", glb, Y, ()),
+    "fbx, Y up": ("a.fbx", fbx("-Z", "Y"), Y, ()),
+    "fbx, Z up": ("a.fbx", fbx("Y", "Z"), Z, ()),
     "usda, Y up, centimeters": ("a.usda", usd("Y", 0.01), Y, ()),
     "usda, Z up, meters": ("a.usda", usd("Z", 1.0), Z, ()),
     "blend, centimeters": ("a.blend", blend, Z, ()),

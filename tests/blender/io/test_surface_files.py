@@ -89,4 +89,4 @@ def test_hair_lies_on_the_surface_of_a_file_and_follows_it(scene, sphere, rng, t
     moved = surface.parent or surface
     moved.location.x += 0.25
     update()
-    np.testing.assert_allclose(world(hair), lines.reshape(-1, 3) + [0.25, 0.0, 0.0], atol=2e-5)
+    np.testing.assert_allclose(world(hair), lines.reshape(-1, 3) + np.array([0.25, 0.0, 0.0]), atol=2e-5)

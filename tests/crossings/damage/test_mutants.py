@@ -29,7 +29,7 @@ OTHERS = {
     "blender/io/groom_files.py": "what was just written",
     "core/files/glb.py": "what was just written",
     "blender/io/groom_library.py": "a .blend, whose settings are read by settings_file.py",
-    "blender/io/mesh_files.py": "a USD file that was opened",
+    "blender/io/mesh_files.py": "a USD or FBX file that was opened",
     "blender/io/usd/usd_stage.py": "USD",
     "blender/render/library_picture.py": "a picture that was just drawn",
     "core/files/light_images.py": "OpenEXR",

@@ -28,7 +28,7 @@ PATIENCE = 60.0  # [s] without output of a process
 _MEMORY = 4 * 2**30  # [bytes] in addition to the memory of the process
 
 CURVES, TABLES = "curves", "tables"
-MESHES = (".ply", ".usdc", ".usda", ".usdz", ".abc", ".obj", ".stl", ".glb", ".gltf")
+MESHES = (".ply", ".usdc", ".usda", ".usdz", ".abc", ".obj", ".stl", ".glb", ".gltf", ".fbx")
 NAMES = (CURVES, TABLES, *MESHES)
 
 
@@ -59,6 +59,7 @@ def _samples(name, folder):
         ".stl": bpy.ops.wm.stl_export,
         ".abc": lambda filepath: bpy.ops.wm.alembic_export(filepath=filepath, as_background_job=False),
         ".glb": bpy.ops.export_scene.gltf,
+        ".fbx": bpy.ops.export_scene.fbx,
         ".gltf": lambda filepath: bpy.ops.export_scene.gltf(filepath=filepath, export_format="GLTF_SEPARATE"),
     }.get(path.suffix, bpy.ops.wm.usd_export)
     write(filepath=str(path))
