@@ -15,6 +15,9 @@ import pytest
 from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, largest_file, run_here, write_obj
 from tests.support.pairs import pairs, share_of
 
+# Of Blender's exporter of FBX.
+pytestmark = pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
+
 SMALL = ("--guides", 5, "--strands", 20)
 
 

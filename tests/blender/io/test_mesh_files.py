@@ -13,6 +13,9 @@ from tests.support.commands import TETRAHEDRON, distance_to, load, run_here, wri
 from tests.support.pairs import pairs
 
 VERTICES, TRIANGLES = TETRAHEDRON
+# Of Blender's exporter of FBX.
+pytestmark = pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
+
 MOVED = np.array([5.0, -1.0, 2.0])
 
 
