@@ -71,16 +71,22 @@ def read(
             ramp = ramps.map_samples(item, False)
             source = sources.read(hair, surface_object, surface, settings, item.image, ramp=ramp)
             value = getattr(styles[place], setting)
-            found[place, setting] = VariedNumber(value, _limited(details, value), source)
+            found[place, setting] = VariedNumber(value, _limited(details, setting, value), source)
         except HairError as error:
             status = str(error)
     return found, status
 
 
-def _limited(details, value):
-    """Return the `Param` of a setting, with a smallest value in place of zero for a setting that must be positive."""
+def _limited(details, name, value):
+    """Return the `Param` of a setting, with a smallest value in place of zero for a setting that must be positive, or
+    whose zero is no limit.
+    """
     least = _LEAST_LOCK if details.is_structural else _LEAST
-    return details if details.above == -np.inf else replace(details, low=least * value, above=-np.inf)
+    may_be_zero = details.above == -np.inf and name != _UNLIMITED_AT_ZERO
+    return details if may_be_zero else replace(details, low=least * value, above=-np.inf)
+
+
+_UNLIMITED_AT_ZERO = "to_length"  # of the style Trim
 
 
 _LEAST, _LEAST_LOCK = 1e-3, 0.1  # of the setting; of a size of locks, as small locks are many

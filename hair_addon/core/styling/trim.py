@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..params import param
-from .base import Cutter, Step, StyleSettings, step_of
+from .base import Cutter, Step, StyleSettings, of_each, step_of
 
 LABEL = "Trim"
 DESCRIPTION = "Cut or scale strands to a length"
@@ -66,6 +66,7 @@ class Settings(StyleSettings):
         soft_high=1.0,
         unit="LENGTH",
         subtype="DISTANCE",
+        may_vary=True,
     )
     undercoat: float = param(
         0.0,
@@ -94,7 +95,7 @@ def steps(settings: Settings, cutters: Mapping[str, Cutter]) -> list[Step]:
     numbers = {
         "factor": settings.factor,
         "random_part": settings.random,
-        "to_length": settings.to_length or NO_LIMIT,
+        "to_length": of_each(lambda length: length or NO_LIMIT, settings.to_length),
         "undercoat": settings.undercoat,
         "undercoat_length": settings.undercoat_length,
         "is_cut": float(settings.method == "CUT"),

@@ -19,6 +19,7 @@ BELOW = (clump.Settings(levels=1), frizz.Settings(seed=2))
 # Style, other styles above it, {setting: (value in one half, value in the other half)}.
 CASES = {
     "trim": (trim.Settings(undercoat=0.2), (), {"factor": (0.8, 0.3), "random": (0.1, 0.5), "undercoat": (0.2, 0.6)}),
+    "longest": (trim.Settings(), (), {"to_length": (0.12, 0.0)}),
     "curl": (curl.Settings(), (), {"radius": (0.004, 0.0), "pitch": (0.02, 0.05), "flatness": (0.1, 1.0)}),
     "curl in locks": (curl.Settings(), BELOW[:1], {"radius": (0.004, 0.007), "coherence": (0.9, 0.2)}),
     "hands of curls": (

@@ -191,3 +191,20 @@ def test_sizes_of_locks_by_a_map(hair, window):  # noqa: F811
     bindings.of(hair.data).update_points()
     np.testing.assert_allclose(shown, bindings.of(hair.data).points, atol=2e-5)
     assert np.abs(shown - found).max() > 0.01
+
+
+def test_a_black_map_of_the_maximum_length_cuts(hair):
+    """A map of *Maximum Length* shortens strands where it is black, although a maximum of zero is no limit; without a
+    limit the map has no effect.
+    """
+    name, _surface = half_group()
+    api.add_style(hair.data, "TRIM")
+    setting, whole = "styles.Trim.to_length", points(hair.data)
+    api.set_map(hair.data, setting, f"group:{name}")
+    np.testing.assert_array_equal(points(hair.data), whole)
+    hair.data.vellus.styles[0].trim.to_length = 10.0
+    found = points(hair.data)
+    lengths = np.linalg.norm(np.diff(found, axis=1), axis=2).sum(axis=1)
+    is_black, is_white = (found[:, 0, 0] < side for side in (-0.15, 0.25))
+    assert lengths[is_black].max() < 0.02 and not (found[is_black] == whole[is_black]).all(axis=(1, 2)).any()
+    np.testing.assert_array_equal(found[~is_white], whole[~is_white])
