@@ -21,7 +21,7 @@ def begin(objects):
 def limited(guides, points, depsgraph):
     """Limit the points (N, 3) of combed guides, write and return them; return `points` if none is moved."""
     former = reported.former_points_of(guides)
-    if former is None or not _is_edited(guides):
+    if former is None or not _is_edited(guides, points):
         return points
     allowed = frozen_points.restored(guides, former, points)
     if guides.vellus.keeps_outside:
@@ -35,8 +35,8 @@ def limited(guides, points, depsgraph):
     return allowed
 
 
-def _is_edited(guides):
-    """Whether an artist edits guides that are limited, and neither settings nor layers have just moved them."""
+def _is_edited(guides, points):
+    """Whether an artist edits limited guides with points (N, 3): neither settings nor layers have just moved them."""
     if not guides.vellus.keeps_outside and frozen_points.FROZEN not in guides.attributes:
         return False
     if attributes.is_from_library(guides):
@@ -44,5 +44,5 @@ def _is_edited(guides):
     if not any(user.data == guides and user.mode in _MODES for user in bpy.data.objects):
         return False
     if len(guides.vellus.layers):
-        return recording.is_edited(guides)
+        return recording.is_edited(guides, points)
     return curves.is_hand_made(guides) or curves.is_combed(guides)

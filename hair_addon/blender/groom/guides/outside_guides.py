@@ -14,7 +14,7 @@ from ....core import dynamics, grooming
 from ....core.errors import HairError
 from ....core.geometry import mesh as mesh_math
 from ....core.grooming.guide_tool_settings import OutsideSettings
-from ...data.strands import frozen_points
+from ...data.strands import curves, frozen_points, posed_strands
 from ...data.surfaces import Surface
 from ...host.caches import Cache
 from . import guide_tools
@@ -57,12 +57,18 @@ def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgr
 
     `points` itself if no guide is pushed. Guides without a surface, or with invalid points, are unchanged.
     """
+    starts = curves.curve_offsets(datablock).astype(np.int64)
+    changed = _changed(starts, former, points)
+    if not changed.any():
+        return points
     try:
         barrier = _known(datablock, former, depsgraph)
+        if not posed_strands.pose_of(barrier.surface).is_deformed:
+            return _pushed_at_rest(datablock, barrier, points, starts, changed)
         guides = replace(guide_tools.on_surface(datablock, barrier.surface), local=points)
     except HairError:
         return points  # panels report what is wrong with the guides or their surface
-    guides = replace(guides, points=barrier.surface.from_local(points), weights=_changed(guides.starts, former, points))
+    guides = replace(guides, points=barrier.surface.from_local(points), weights=changed)
     local = points.copy()
     is_pushed = False
     for chosen, places in guide_tools.to_shape(guides):
@@ -74,15 +80,32 @@ def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgr
     return local if is_pushed else points
 
 
+def _pushed_at_rest(datablock, barrier, points, starts, changed):
+    """Return as `pushed_out` on a surface without deformation. Only guides that changed are read: strokes are fast."""
+    counts, local = np.diff(starts), points
+    for count in np.unique(counts[(counts > 1) & (changed > 0.0)]):
+        places = starts[:-1][(counts == count) & (changed > 0.0)][:, None] + np.arange(count)
+        shape = barrier.surface.from_local(points[places])
+        if not np.isfinite(shape).all():
+            return points
+        after, is_moved = barrier.barrier.moved(barrier.factor * shape.astype(np.float64), _held(datablock, places))
+        after, rows = (after[is_moved] / barrier.factor).astype(np.float32), places[is_moved]
+        moved = (after != shape[is_moved]).any(axis=2)
+        if moved.any():
+            local = points.copy() if local is points else local
+            local[rows[moved]] = barrier.surface.to_local(after[moved][:, None])[:, 0]
+    return local
+
+
 def _changed(starts, former, points):
     """Return (G,) float64: 1 for guides that have other points than before, or are new."""
     changed = np.zeros(len(starts) - 1)
     if len(former) > len(points):
         return changed  # guides were removed
-    is_other = np.ones(len(points), bool)
-    is_other[: len(former)] = (points[: len(former)] != former).any(axis=1)
+    is_other = np.ones((len(points), 3), bool)
+    np.not_equal(points[: len(former)], former, out=is_other[: len(former)])
     has_points = np.diff(starts) > 0
-    changed[has_points] = np.logical_or.reduceat(is_other, starts[:-1][has_points])
+    changed[has_points] = np.logical_or.reduceat(is_other.ravel(), 3 * starts[:-1][has_points])
     return changed
 
 
