@@ -8,6 +8,7 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         ambient_cube,
+        blackbody,
         cryptomatte,
         environment,
         flip,

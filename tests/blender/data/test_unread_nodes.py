@@ -57,12 +57,49 @@ def test_constant_nodes_of_lights_are_read_without_a_sentence(lamp):
         np.testing.assert_array_equal(record()[name], plain[name], err_msg=name)
 
 
+def test_nodes_that_compute_constants_light_as_in_cycles(lamp, tmp_path):
+    """A plane below a lamp with Blackbody, Math and Light Falloff has the light of Cycles within 2 %."""
+    light, emission = lamp
+    tree, scene = light.node_tree, bpy.context.scene
+    bpy.context.object.location.z = 2.0
+    link(tree, "ShaderNodeBlackbody", emission.inputs["Color"]).inputs["Temperature"].default_value = 2700.0
+    falloff = link(tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
+    math = link(tree, "ShaderNodeMath", falloff.inputs["Strength"])
+    math.operation, math.inputs[0].default_value, math.inputs[1].default_value = "MULTIPLY", 1.5, 2.5
+    assert told() == []
+    power = record()["power"][:3]
+    bpy.ops.mesh.primitive_plane_add(size=1.0)
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 1.0))
+    scene.camera, scene.camera.data.type, scene.camera.data.ortho_scale = bpy.context.object, "ORTHO", 0.01
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 16, False
+    scene.render.resolution_x = scene.render.resolution_y = 4
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(tmp_path / "plane.exr")
+
+    def rendered():
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(scene.render.filepath)
+        pixels = np.reshape(image.pixels, (-1, 4))[:, :3].mean(axis=0)
+        bpy.data.images.remove(image)
+        return pixels
+
+    lit = rendered()
+    for socket in emission.inputs:
+        for one in socket.links:
+            tree.links.remove(one)
+    emission.inputs["Color"].default_value, emission.inputs["Strength"].default_value = (1, 1, 1, 1), 1.0
+    np.testing.assert_allclose(power / record()["power"][:3], lit / rendered(), rtol=0.02)
+
+
 def test_other_nodes_of_lights_are_named(lamp):
     light, emission = lamp
-    link(light.node_tree, "ShaderNodeBlackbody", emission.inputs["Color"])
-    link(light.node_tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
+    link(light.node_tree, "ShaderNodeTexNoise", emission.inputs["Color"])
+    falloff = link(light.node_tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
     (sentence,) = told()
-    assert sentence.endswith(f'as values: "{light.name}" (Blackbody, Light Falloff).')
+    assert sentence.endswith(f'as values: "{light.name}" (Noise Texture).')
+    light.node_tree.links.new(falloff.outputs["Linear"], emission.inputs["Strength"])
+    (sentence,) = told()
+    assert sentence.endswith(f'as values: "{light.name}" (Noise Texture, Light Falloff).')
     bpy.context.object.hide_render = True
     assert told() == []
 

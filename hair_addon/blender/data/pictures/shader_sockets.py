@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ....core.imaging import blackbody
+
 LUMINANCE = (0.2126, 0.7152, 0.0722, 0.0)  # Rec. 709, for a color that is read as a number
 
 
@@ -38,13 +40,17 @@ class ShaderInput:
         return node, output
 
     def constant(self):
-        """Return the constant value of the socket, of the socket it is linked to, or of a value node; None for other
-        nodes.
+        """Return the constant value of the socket, of the socket it is linked to, or of nodes that compute a constant:
+        RGB, Value, Math, Blackbody and a quadratic Light Falloff; None for other nodes.
         """
         end, node, output = self._followed()
-        if node is not None and node.type not in {"RGB", "VALUE"}:
+        own = self.socket.default_value
+        if node is None or node.type in {"RGB", "VALUE"}:
+            value = (end if node is None else output).default_value
+        else:
+            value = _computed(node, output)
+        if value is None:
             return None
-        value, own = (end if node is None else output).default_value, self.socket.default_value
         is_color = hasattr(own, "__len__")
         if is_color == hasattr(value, "__len__"):
             return value
@@ -96,6 +102,35 @@ def nodes_of(tree, groups=()):
         yield ShaderNode(node, groups)
         if node.type == "GROUP" and node.node_tree is not None:
             yield from nodes_of(node.node_tree, (*groups, node))
+
+
+_OPERATIONS = {
+    "ADD": lambda a, b: a + b,
+    "SUBTRACT": lambda a, b: a - b,
+    "MULTIPLY": lambda a, b: a * b,
+    "DIVIDE": lambda a, b: a / b if b else 0.0,
+    "MINIMUM": min,
+    "MAXIMUM": max,
+}
+
+
+def _computed(found, output):
+    """Return the constant value of an output of a `ShaderNode` that computes it from constants, or None."""
+    node = found.node
+    if node.type == "MATH" and node.operation in _OPERATIONS:
+        values = [ShaderInput(socket, found.groups).constant() for socket in node.inputs[:2]]
+        if None in values:
+            return None
+        value = _OPERATIONS[node.operation](*values)
+        return min(max(value, 0.0), 1.0) if node.use_clamp else value
+    if node.type == "BLACKBODY":
+        temperature = found["Temperature"].constant()
+        if temperature is None or not temperature >= blackbody.LEAST:
+            return None
+        return (*map(float, blackbody.blackbody_color(temperature)), 1.0)
+    if node.type == "LIGHT_FALLOFF" and output.name == "Quadratic" and found["Smooth"].constant() == 0.0:
+        return found["Strength"].constant()
+    return None
 
 
 def _link_of(socket):

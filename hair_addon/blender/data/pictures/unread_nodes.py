@@ -70,7 +70,7 @@ def _unread_of(tree, read, textures):
 def _before(shader_input, textures):
     """Return the label of the node that an input reads, unless it is a constant or of types that are read."""
     node = shader_input.source()[0]
-    if node is None or node.type in {"RGB", "VALUE", *textures}:
+    if node is None or node.type in textures or shader_input.constant() is not None:
         return []
     return [node.node.bl_label]
 
