@@ -21,6 +21,7 @@ _FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
 _PIECE_LENGTH, _GREATEST_BEND = 2.0, 0.5
 
 _LEAST_STRANDS, _LEAST_POINTS = 2000, 9
+_LEAST_WIDTH = 1e-30  # [samples]: hair that is scaled to a plane has no width
 _INSIDE = 1e15  # samples per unit for a viewer inside of the hair: finite, as strands may have no width or length
 
 
@@ -53,7 +54,8 @@ def _steps(strands, to_world, limits, view):
         return drawing.Steps(None, max(int(count * part), 1))
     samples_per_unit, diameters = _sizes_in(view, strands, to_world)
     samples_per_meter = samples_per_unit * drawing.scales_of(to_world)
-    wanted = 2.0 * strands.mean_radius * samples_per_meter / np.minimum(_FULL_WIDTH, _WIDTH_PART * diameters)
+    most_widths = np.minimum(_FULL_WIDTH, np.maximum(_WIDTH_PART * diameters, _LEAST_WIDTH))
+    wanted = 2.0 * strands.mean_radius * samples_per_meter / most_widths
     strand_counts = np.maximum(count * np.minimum(wanted, part), min(_LEAST_STRANDS, count * part))
     strand_counts = np.minimum(strand_counts, count).astype(int)
     lengths = strands.mean_length * samples_per_meter
@@ -89,7 +91,7 @@ def _points_that_show(strands, lengths):
 
 def _sizes_in(view, strands, to_world):
     """Return (N,) samples per unit at the nearest strand and (N,) diameters [samples] of `StrandsOnGPU` at (N, 4, 4)
-    places.
+    places: of hair with an uneven scale, along the axis that is scaled least.
 
     Both are very large if the viewer is inside of the hair's sphere.
     """
@@ -98,4 +100,6 @@ def _sizes_in(view, strands, to_world):
     if view["is_perspective"]:
         distances = np.linalg.norm(view["eye"][:3] - centres, axis=1) - radii
         per_unit = np.divide(per_unit, distances, out=np.full(len(to_world), _INSIDE), where=distances > 0.0)
-    return per_unit, 2.0 * radii * per_unit
+    scales = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
+    unevenness = np.divide(scales[:, 2], scales[:, 0], out=np.ones(len(scales)), where=scales[:, 0] > 0.0)
+    return per_unit, 2.0 * radii * per_unit * unevenness

@@ -84,6 +84,33 @@ def test_one_head_alone_is_drawn_by_itself(thin):
     assert isinstance(drawn.occluders[0], surface_textures.SurfaceOnGPU)
 
 
+def test_heads_of_a_linked_library_are_drawn_together(thin, tmp_path):
+    """Instances of a library's collection, in a scene of centimeters, share strands and look like local instances."""
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    collection = bpy.data.collections.new("Head")
+    for one in (thin.parent, thin):
+        collection.objects.link(one)
+        bpy.context.scene.collection.objects.unlink(one)
+    path = str(tmp_path / "head.blend")
+    bpy.data.libraries.write(path, {collection})
+    with bpy.data.libraries.load(path, link=True) as (_found, chosen):
+        chosen.collections = ["Head"]
+    found = []
+    for instanced in (collection, chosen.collections[0]):
+        empties = [bpy.data.objects.new("Instance", None) for _place in PLACES[:3]]
+        for empty, place in zip(empties, PLACES, strict=False):
+            empty.instance_type, empty.instance_collection, empty.matrix_world = "COLLECTION", instanced, place
+            bpy.context.scene.collection.objects.link(empty)
+        bpy.context.view_layer.update()
+        drawn = read()
+        assert [len(batch.indices) for batch in drawn.batches] == [3] and len(drawn.occluders) == 1
+        found.append(pictures(drawn, {0: 0})[0])
+        for empty in empties:
+            bpy.data.objects.remove(empty)
+    np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1.0 / 255.0)
+    assert found[0][..., 3].max() > 0.5
+
+
 class Calls:
     """Number of calls of Python functions and of the gpu module in a context."""
 
