@@ -142,7 +142,7 @@ def varied_trees(
             continue
         lengths = [details.unit == "LENGTH" for name, _default, details in known if name in varied]
         read = [number.read(binding.roots, binding.identities[0], None) for number in varied.values()]
-        values = _values_of_trees(read, lengths)
+        values = _values_of_trees(read, lengths, [getattr(settings, name) for name in varied])
         parts = tuple(map(_Structural, varied.values(), values, lengths))
         combinations = itertools.product(*(each.tolist() for each in values))
         changed = (replace(settings, **dict(zip(varied, chosen, strict=True))) for chosen in combinations)
@@ -153,14 +153,32 @@ def varied_trees(
     return found
 
 
-def _values_of_trees(read, lengths):
-    """Return the values of each number, rising, with at most `MOST_SIZES` combinations; read: [(S,)] of strands."""
+def _values_of_trees(read, lengths, own):
+    """Return the values of each number, rising, with at most `MOST_SIZES` combinations.
+
+    read: [(S,)] of strands; own: values of the settings. Many values become steps from the setting, so that a map that
+    is painted goes on with the trees of its former values.
+    """
     found = [np.unique(values) for values in read]
+    if math.prod(map(len, found)) > MOST_SIZES:
+        found = list(map(_steps, found, lengths, own))
     if math.prod(map(len, found)) <= MOST_SIZES:
         return found
+    found = [np.unique(values) for values in read]
     most = max(int(MOST_SIZES ** (1.0 / len(found)) + 1e-9), 2)
     spaced = (np.geomspace if is_length else np.linspace for is_length in lengths)
     return [
         space(values[0], values[-1], most) if len(values) > most else values
         for space, values in zip(spaced, found, strict=True)
     ]
+
+
+_RATIO, _STEP = 10.0 ** (1.0 / (MOST_SIZES - 1)), 1.0 / MOST_SIZES  # of neighboring lengths; between other values
+
+
+def _steps(values, is_length, own):
+    """Return the steps from a setting's own value that are nearest to values (N,), rising."""
+    if is_length:
+        steps = own * _RATIO ** np.unique(np.rint(np.log(values / own) / np.log(_RATIO)))
+        return np.minimum(steps, max(values[-1], own))  # within the range of the setting
+    return np.clip(own + _STEP * np.unique(np.rint((values - own) / _STEP)), values[0], values[-1])
