@@ -8,6 +8,7 @@ from mathutils.bvhtree import BVHTree
 
 from blend_samples.heads import eyes, head, portrait
 from hair_addon import api
+from tests.support import reading
 
 TARGET = np.array([0.3, -1.0, 0.74])
 
@@ -82,3 +83,15 @@ def test_brows_and_lashes_grow_out_of_the_skin(name, samples):
     away = [skin.find_nearest(root.tolist())[3] for root in roots[::7]]
     assert max(away) < 0.001
     assert all(len(half) > 0.4 * len(roots) for half in halves(roots))
+
+
+def test_hair_covers_the_nape():
+    """Behind the neck, the middle has at least half as many guides as the sides, so that the collar does not show."""
+    built = head.build()
+    portrait.bust.build(built)
+    guides, _hair = portrait.grow(built, strand_count=20)
+    combed = reading.points(guides)
+    for height in (0.66, 0.63, 0.60):
+        is_crossing = (combed[:, :-1, 2] >= height) & (combed[:, 1:, 2] < height) & (combed[:, 1:, 1] > 0.0)
+        counts, _edges = np.histogram(combed[:, 1:, 0][is_crossing], bins=np.linspace(-0.09, 0.09, 4))
+        assert counts[1] > 0.5 * counts[[0, 2]].mean()
