@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender.gpu import shadows, strand_batches, surface_textures
+from hair_addon.blender.gpu import ambient_visibility, shadows, strand_batches, surface_textures
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
 from hair_addon.blender.render.viewport.outline import HairOutline, OutlineStyle
+from hair_addon.core.imaging import ambient_cube
 
 SIZE = (96, 64)
 WORLD_TO_VIEW = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, -9], [0, 0, 0, 1.0]])
@@ -109,6 +110,29 @@ def test_heads_of_a_linked_library_are_drawn_together(thin, tmp_path):
             bpy.data.objects.remove(empty)
     np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1.0 / 255.0)
     assert found[0][..., 3].max() > 0.5
+
+
+def test_visibility_that_follows_moving_heads_becomes_that_of_heads_at_rest(thin):
+    """After all directions, visibility of the world that is renewed in motion is that of each head at rest."""
+    thin.data.vellus.hair.strand_count = 200
+    link(thin, (PLACES[0], PLACES[2]))
+    drawn = read()
+    placed = [(strands, to_world) for strands, _shading, to_world, _limits in drawn.hair]
+    through = [(shading.opacity, shading.forward) for _strands, shading, *_ in drawn.hair]
+    blockers = [blocker.surface for blocker in drawn.blockers]
+    shared = drawn.hair_visibility[0]
+    wanted = {name: np.array(texture.read()) for name, texture in shared.items()}
+    for texture in shared.values():
+        texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+    renewal, seen = ambient_visibility.Renewal(), (drawn.hair_visibility, drawn.surface_visibility)
+    receivers = [surface for surface, _parts in drawn.surfaces]
+    for _direction in ambient_cube.DIRECTIONS:
+        seen = renewal.step(seen, placed, blockers, through, receivers)
+    for name, values in wanted.items():
+        found = np.array(seen[0][1][name].read(), float)
+        assert np.quantile(np.abs(found - values), 0.98) <= 2.0 * values.max() / 255.0
+    layers = wanted["visibility_x_y"].reshape(2, -1)
+    assert (layers[0] != layers[1]).any()
 
 
 class Calls:
