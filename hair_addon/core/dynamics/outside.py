@@ -27,6 +27,7 @@ _RETURN = wp.constant(0.15)  # fraction of the way back to the original path, pe
 _ROUNDS = wp.constant(3)  # a point moves out, and back to its distance from the previous point, in each round
 _TURNS = wp.constant(8)  # further turns of a segment outwards, where a mesh is concave
 _TURN = wp.constant(0.3)  # fraction of a segment's length by which a turn moves the segment's end
+_OVERSHOOT = wp.constant(4.0)  # limit of a turn, in missing distances: a point that is almost outside turns little
 _PUSHES = wp.constant(4)  # further moves out, for notches of a mesh
 _AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves later queries
 _FAR = wp.constant(1e6)  # [m]
@@ -171,7 +172,7 @@ def _keep_outside(
                         if step < _ROUNDS or step > _ROUNDS + _TURNS:
                             place += lack * out
                         elif step < _ROUNDS + _TURNS:
-                            place += _TURN * size * out
+                            place += wp.min(_TURN * size, _OVERSHOOT * lack) * out
                         else:  # the notch is narrower than the segment, which turns back
                             place = last_but_one
                         if step <= _ROUNDS + _TURNS:
