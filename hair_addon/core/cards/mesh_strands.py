@@ -26,7 +26,8 @@ _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
-_MOST_FACES = 20_000  # of a piece: larger ones are bodies
+_MOST_FACES = 20_000  # of a piece: larger ones beside smaller ones are bodies
+_MOST_SCULPTED = 500_000  # of a piece of a mesh without smaller ones: ten seconds
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ def mesh_strands(
     progress("Finding cards", 0.0)
     pieces = pieces_of(mesh)
     counts = _shares(mesh, pieces, settings.strand_count)
-    maker = _Maker(mesh, surface, settings, corner_uvs)
+    has_small = any(len(piece.faces) <= _MOST_FACES for piece in pieces)
+    maker = _Maker(mesh, surface, settings, corner_uvs, _MOST_FACES if has_small else _MOST_SCULPTED)
     for place, (piece, count) in enumerate(zip(pieces, counts.tolist(), strict=True)):
         if place % 256 == 0:
             part_of(progress, 0.1, 0.8)("Following cards", place / len(pieces))
@@ -104,8 +106,8 @@ def _shares(mesh, pieces, count):
 class _Maker:
     """Strands of the pieces of a mesh, which are added in turn."""
 
-    def __init__(self, mesh, surface, settings, corner_uvs):
-        self._mesh, self._settings, self._uvs = mesh, settings, corner_uvs
+    def __init__(self, mesh, surface, settings, corner_uvs, most_faces):
+        self._mesh, self._settings, self._uvs, self._most_faces = mesh, settings, corner_uvs, most_faces
         self._away = _distances(surface, mesh.vertices)
         self._vertices = mesh.vertices.astype(np.float64)
         self._random = np.random.default_rng(settings.seed)
@@ -117,7 +119,7 @@ class _Maker:
     def add(self, piece: Piece, count: int) -> None:
         """Add the strands of a piece, or count it as skipped."""
         topology, points = piece.topology, self._vertices[piece.vertices]
-        if len(piece.faces) > _MOST_FACES or not topology.is_simple or not np.ptp(points, axis=0).max() > 0.0:
+        if len(piece.faces) > self._most_faces or not topology.is_simple or not np.ptp(points, axis=0).max() > 0.0:
             self._skipped += 1
         elif topology.euler_characteristic == 1 and not _is_closed_at_tip(topology, points):
             self._add_card(piece, points, count)
@@ -129,7 +131,7 @@ class _Maker:
         if not self._parts:
             raise HairError(
                 "The hair mesh has no cards, tubes or slender locks of at most {most} triangles: pick a mesh of them.",
-                most=_MOST_FACES,
+                most=self._most_faces,
             )
         total = sum(part[1] for part in self._parts)
         if total > MOST_STRANDS:

@@ -223,6 +223,27 @@ def test_strands_scale_with_the_mesh(scale):
     np.testing.assert_allclose(scaled.radii, found.radii * scale, rtol=1e-4)
 
 
+def test_a_sculpted_lock_may_have_more_triangles_than_a_body_beside_cards():
+    """A lock of 25,000 triangles becomes strands inside of it if it is alone; beside smaller parts it is left out."""
+    rings, sides = 201, 63
+    heights, angles = np.linspace(0.0, 1.0, rings)[:, None], np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    radii = 0.02 + 0.06 * np.sin(np.pi * heights)
+    around = [radii * np.cos(angles), radii * np.sin(angles), heights + 0.0 * angles]
+    first = sides * np.arange(rings - 1)[:, None] + np.arange(sides)
+    after = sides * np.arange(rings - 1)[:, None] + (np.arange(sides) + 1) % sides
+    faces = [(first, after, after + sides), (first, after + sides, first + sides)]
+    triangles = np.concatenate([np.stack(corners, axis=-1).reshape(-1, 3) for corners in faces]).astype(np.int32)
+    lock = TriMesh(np.stack(around, axis=-1).reshape(-1, 3).astype(np.float32), triangles)
+    found = made(lock, strand_count=9)
+    assert len(triangles) > 25_000 and (found.piece_count, found.skipped_count) == (1, 0)
+    limits = 0.02 + 0.06 * np.sin(np.pi * found.points[:, 2])
+    assert (np.linalg.norm(found.points[:, :2], axis=1) < limits + 0.002).all()
+    ends = [(strand[0, 2], strand[-1, 2]) for strand in strands_of(found)]
+    assert np.max(ends, axis=0)[0] < 0.1 and np.min(ends, axis=0)[1] > 0.9
+    beside = made(joined(card()[0], lock), strand_count=10)
+    assert (beside.piece_count, beside.skipped_count) == (1, 1)
+
+
 def test_meshes_that_are_not_hair_are_refused_with_one_sentence():
     ball = sphere()
     for mesh, sentence in [
