@@ -86,6 +86,12 @@ def settings(group):
 def value(declared, source, folder, odd=0.0):
     """Return a random value of a property; source: a `random.Random`; folder: of files; odd: rate of odd numbers."""
     name = declared.identifier
+    if declared.type == "COLLECTION":  # up to three items, as operators take them
+        of_items = [item for item in declared.fixed_type.properties if item.identifier not in {"rna_type", "name"}]
+        return [
+            {item.identifier: value(item, source, folder, odd) for item in of_items}
+            for _ in range(source.randint(0, 3))
+        ]
     if declared.type == "STRING":
         return _text(name, source, folder)
     if declared.type == "BOOLEAN":
