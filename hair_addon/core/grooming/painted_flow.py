@@ -38,11 +38,13 @@ class PaintedFlow:
         length = float(np.linalg.norm(along))
         if not length > 0.0:
             return
-        count = max(int(np.ceil(length / (_PIECE * self._radius))), 1)
-        near = np.linalg.norm(self._roots - (start + 0.5 * along), axis=1) < self._radius + 0.5 * length
-        rows = np.flatnonzero(near)
+        places = (self._roots - start) @ along / length
+        beside = np.linalg.norm(self._roots - start - places[:, None] * along / length, axis=1)
+        away = np.maximum(np.abs(places - 0.5 * length) - 0.5 * length, 0.0)
+        rows = np.flatnonzero(np.maximum(beside, away) < self._radius)
+        count = max(np.ceil(length / (_PIECE * self._radius)), 1.0)
         facing = _smoothstep(self._normals[rows] @ normal / _FACING)
-        for number in range(count):
+        for number in _pieces_near(places[rows] / length * count, self._radius / length * count, count):
             middle = start + (number + 0.5) / count * along
             distances = np.linalg.norm(self._roots[rows] - middle, axis=1)
             effect = self._strength * facing * _smoothstep(1.0 - distances / self._radius)
@@ -98,6 +100,17 @@ def _rotations(axes, angles):
         cross[:, row, column], cross[:, column, row] = sign * axes[:, part], -sign * axes[:, part]
     sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def _pieces_near(places, reach, count):
+    """Return the numbers of pieces, of which there are `count`, within a reach of places along them [pieces].
+
+    Roots may be near only a few of the many pieces of a long stroke with a small radius.
+    """
+    steps = int(min(reach, count)) + 2
+    nearest = np.unique(np.clip(np.floor(places), 0.0, count - 1.0))
+    numbers = np.unique(nearest[:, None] + np.arange(-steps, steps + 1))
+    return numbers[(numbers >= 0.0) & (numbers < count)]
 
 
 def _smoothstep(x):

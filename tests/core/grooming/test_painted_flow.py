@@ -97,3 +97,19 @@ def test_later_strokes_replace_earlier_ones(plane):
     flow = painted(roots, normals, there_and_back)
     is_below = (np.abs(roots[:, 1]) < 0.05) & (np.abs(roots[:, 0]) < 0.4)
     np.testing.assert_allclose(flow.directions[is_below][:, 0], -1.0, atol=1e-6)
+
+
+def test_the_work_of_a_long_stroke_with_a_small_radius_is_limited(monkeypatch):
+    """A small radius, such as one typed into the redo panel, divides a stroke into millions of pieces."""
+    roots = np.array([[0.0, 0.0, 0.0], [0.5, 2e-8, 0.0], [0.0, 0.5, 0.0]])
+    smoothstep, calls = painted_flow._smoothstep, []
+
+    def counted(x):
+        calls.append(1)
+        assert len(calls) < 200
+        return smoothstep(x)
+
+    monkeypatch.setattr(painted_flow, "_smoothstep", counted)
+    flow = painted(roots, np.tile(UP, (3, 1)), [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.5, 1e-7)
+    assert flow.shares[0] > 0.5 and 0.5 < flow.shares[1] / flow.shares[0] < 1.0 and flow.shares[2] == 0.0
+    np.testing.assert_allclose(flow.directions, [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
