@@ -162,7 +162,7 @@ def _combed(root, length, surfaces):
     side = math.copysign(1.0, root[0] - head.PARTING)
     front = _part(-root[1], 0.0, 0.12)
     crown = _part(root[2], 0.79, 0.84)
-    # Behind the head hair falls straight: parted there, it leaves the nape bare.
+    # Behind the head, hair falls straight: a parting there would leave the nape bare.
     aside = 1.0 - 0.9 * _part(root[1], -0.04, 0.02)
     sweep = Vector((side * (0.35 * aside + 0.45 * front), 0.15 + 0.16 * front**4, -0.45 + 0.45 * front))
     around = Vector((side * 0.12 * aside, 0.05 + 0.16 * front**4, -0.95))

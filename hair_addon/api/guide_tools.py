@@ -74,10 +74,10 @@ def change_guides(
 
 
 def paint_flow(guides: Curves, stroke: ArrayLike, settings: FlowSettings | None = None, **changes: Any) -> int:
-    """Turn guides near a stroke on their surface toward its direction, as the Paint Flow tool does.
+    """Turn guides near a stroke on their surface toward the direction of the stroke, as the Paint Flow tool does.
 
-    stroke: points (K, 3) on the surface as it is posed, in its local coordinates; settings and changes: as of
-    `change_guides`. Returns the number of turned guides. Raises `HairError`.
+    stroke: points (K, 3) on the posed surface, in its local coordinates; settings and changes: as for `change_guides`.
+    Returns the number of turned guides. Raises `HairError`.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> turned = api.paint_flow(guides, [(0.0, 0.0, 0.1), (0.05, 0.0, 0.1)], radius=0.03)

@@ -15,7 +15,7 @@ import pytest
 from tests.support.commands import HEAD, PYTHONPATH, TETRAHEDRON, command, largest_file, run_here, write_obj
 from tests.support.pairs import pairs, share_of
 
-# Of Blender's exporter of FBX.
+# A warning of Blender's FBX exporter.
 pytestmark = pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
 
 SMALL = ("--guides", 5, "--strands", 20)

@@ -309,8 +309,8 @@ def test_painting_where_guides_are_on_another_surface(curls):
 
 
 def test_linked_hair_shows_its_maps(curls, tmp_path):
-    """Hair that is linked without an override has the strands, looks and radii of its maps; a map can be looked at, its
-    rows are gray below the reason, and nothing can be changed.
+    """Hair that is linked without an override has the strands, looks and radii of its maps; a map can be opened, but
+    its rows are gray below the reason, and nothing can be changed.
     """
     vary(curls)
     api.set_map(curls.data, "look.melanin", "group:half", low=0.25)

@@ -17,7 +17,7 @@ from tests.support.exchange.imported import lines_on, select, world
 
 @dataclass(frozen=True)
 class Way:
-    """A way of a surface through a file. options: of the exporter of FBX, None for glTF; reader: of bpy.ops."""
+    """How a surface passes through a file. options: of the FBX exporter, None for glTF; reader: in bpy.ops."""
 
     reader: tuple
     options: dict | None = None
@@ -68,7 +68,7 @@ def through_file(surface, folder, way):
     return max((one for one in bpy.data.objects if one.type == "MESH"), key=lambda one: len(one.data.vertices))
 
 
-@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of Blender's exporter of FBX
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of Blender's FBX exporter
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 def test_hair_lies_on_the_surface_of_a_file_and_follows_it(scene, sphere, rng, tmp_path, way):
     """Imported curves are at their places in the world, grow on the imported surface, and move with it."""

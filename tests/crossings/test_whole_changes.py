@@ -216,7 +216,7 @@ CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
 
 
 def cases():
-    """Return each of `CASES` failing at one or two of its calls; every second case, and many calls, are `long`."""
+    """Return each of `CASES` with failures at one or two calls; every second case, and many calls, are `long`."""
     for place, case in enumerate(CASES):
         name = f"{case[0]}-{case[1].__name__}"
         yield pytest.param(

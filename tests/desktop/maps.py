@@ -75,7 +75,7 @@ def weights():
 
 
 def note(name):
-    """Note how many strands are those of the value at From, and at To, and whether these are where they belong."""
+    """Note how many strands equal those of the values at From and at To, and whether they are in the right places."""
     found, corners = strands(), weights()
     is_low, is_high = (np.abs(found - references[value]).max(axis=(1, 2)) < 1e-6 for value in (LOW, HIGH))
     is_black, is_white = (corners == 0.0).all(axis=1), (corners == 1.0).all(axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of tests of long lists and of all pairs: `make test` runs a share of them, `make long` the rest."""
+"""Parameters of tests with long lists or all pairs: `make test` runs a share of them, `make long` the rest."""
 
 from collections.abc import Iterable
 
@@ -7,15 +7,15 @@ import pytest
 
 
 def share_of(values: Iterable, share: int = 3) -> list:
-    """Parameters for `pytest.mark.parametrize`: one value in `share` is not marked `long`."""
+    """Return parameters for `pytest.mark.parametrize`: one value in `share` is not marked `long`."""
     return [pytest.param(value, marks=() if i % share == 0 else pytest.mark.long) for i, value in enumerate(values)]
 
 
 def pairs(rows: Iterable, columns: Iterable, share: int = 3) -> list:
-    """Parameters for `pytest.mark.parametrize` with two names: every pair of a row and a column.
+    """Return parameters for `pytest.mark.parametrize` with two names: every pair of a row and a column.
 
-    One in `share` is not marked `long`. These are on diagonals, so each row is paired with every `share`-th column, and
-    each column with every `share`-th row.
+    One pair in `share` is not marked `long`. These pairs are on diagonals, so each row is paired with every `share`-th
+    column, and each column with every `share`-th row.
     """
     columns = list(columns)
     return [
@@ -26,5 +26,5 @@ def pairs(rows: Iterable, columns: Iterable, share: int = 3) -> list:
 
 
 def share_of_rows(rows: Iterable, share: int = 3) -> list:
-    """As `share_of` for `pytest.mark.parametrize` with several names: one row of values in `share` is not `long`."""
+    """Return parameters as `share_of`, for several names: one row of values in `share` is not marked `long`."""
     return [pytest.param(*row, marks=() if i % share == 0 else pytest.mark.long) for i, row in enumerate(rows)]

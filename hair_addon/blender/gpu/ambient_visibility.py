@@ -20,14 +20,14 @@ _FULL_WIDTH = 0.5  # maximum width [texels] of a strand that represents several
 
 
 def measure(hair, blockers, opacities, surfaces, forwards=None):
-    """Visibility textures {sampler: texture} for each hair and for each surface: two lists.
+    """Return the visibility textures {sampler: texture} of each hair and of each surface, as two lists.
 
-    Hair objects that share strands share array textures, with a layer for each: `layers`.
+    Hair objects that share strands share array textures, with a layer for each object: `layers`.
 
-    hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of strands, one
-    for each hair, for which its visibility is computed; that of surfaces is for the densest hair; surfaces:
-    [SurfaceOnGPU] that receive light; forwards: (3,) fraction of light that a strand of each hair passes on, None: by
-    the opacities, equal for all channels.
+    hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of a strand of
+    each hair, for the visibility of this hair; the visibility of surfaces is for the densest hair; surfaces:
+    [SurfaceOnGPU] that receive light; forwards: the fraction of light (3,) that a strand of each hair passes on, None:
+    one minus the opacity in all channels.
     """
     if forwards is None:
         forwards = [np.full(3, 1.0 - opacity) for opacity in opacities]
@@ -86,7 +86,7 @@ class Renewal:
 
 
 def layers(hair):
-    """Return for each hair its layer in the visibility textures that it shares, None for textures of its own.
+    """Return the layer of each hair in shared visibility textures; None for a hair with textures of its own.
 
     hair: [(StrandsOnGPU, object to world)].
     """
@@ -98,12 +98,12 @@ def layers(hair):
 
 
 def _groups(hair):
-    """Return [indices] of hair that shares strands."""
+    """Return [indices] for each group of hair that shares strands."""
     return strand_batches.groups_of(id(strands) for strands, _to_world in hair)
 
 
 def _layers_of(hair):
-    """Return for each hair (array textures that it shares, its layer), or None."""
+    """Return (shared array textures, layer) of each hair; None for a hair with textures of its own."""
     found = [None] * len(hair)
     for group in _groups(hair):
         if len(group) > 1:
@@ -179,7 +179,7 @@ def _view_of_surface(surface):
 
 
 def joined(seen):
-    """Return {sampler: array texture} of linked surfaces, a layer for each of their textures {sampler: texture}."""
+    """Return {sampler: array texture} of linked surfaces with a layer for each; seen: [{sampler: texture}] of each."""
     size = next((texture.width, texture.height) for texture in seen[0].values())
     found = {name: _texture(size, seen_programs.SUMS, len(seen)) for name in surface_programs.SEEN_SAMPLERS}
     program = seen_programs.join_program()
@@ -193,10 +193,10 @@ def joined(seen):
 
 
 class _Target:
-    """Textures in which visibility is summed, a texel for each place.
+    """Textures in which visibility is summed, with a texel for each place.
 
-    is_in_bytes: add all lights at once and store bytes: see shaders/light/visibility_bytes.glsl; in_layer: array
-    textures {sampler: texture} for bytes, and the layer to fill, None for textures of its own.
+    is_in_bytes: whether all lights are added at once and stored as bytes: see shaders/light/visibility_bytes.glsl;
+    in_layer: (array textures {sampler: texture} of bytes, the layer to fill), None for textures of its own.
     """
 
     def __init__(self, place, is_in_bytes=False, in_layer=None):
@@ -212,8 +212,8 @@ class _Target:
     def completed(self, before, layer=None):
         """Return textures {sampler: texture} of the sums, and begin again from zero.
 
-        before: the textures shown so far, layer: of array textures. Strands' bytes are written into them; for surfaces
-        they take the next sums.
+        before: the textures shown so far; layer: the layer of `before`, None if these are no array textures. The bytes
+        of strands are written into `before`; for surfaces, `before` takes the next sums.
         """
         found = self.textures
         if _is_surface((self.view, self.places)):

@@ -22,7 +22,7 @@ from .strand_textures import bare_vertices, run_for_each, vertex_count
 class Steps:
     """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index.
 
-    The two numbers may be arrays (N,) for linked hair objects; thickness: factor of the strands' width.
+    Both numbers may be arrays (N,), for N linked hair objects; thickness: factor of the strands' width.
     """
 
     point_count: int | np.ndarray | None = None

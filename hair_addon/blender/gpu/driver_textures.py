@@ -12,8 +12,8 @@ _TEXEL_BYTES = {"RGBA32F": 16, "RG32F": 8, "RGBA16F": 8, "R32F": 4, "R16": 2}
 def new_texture(
     size: tuple[int, ...], texture_format: str, texels: np.ndarray | None = None, layers: int = 0
 ) -> gpu.types.GPUTexture:
-    """Return a texture of `size` texels without filtering; texels: float32 values, None: undefined; layers: of an
-    array, 0 for a single picture.
+    """Return a texture of `size` texels without filtering; texels: float32 values, None: undefined; layers: number of
+    layers of an array texture, 0 for a plain texture.
 
     Raises `HairError` if the texture exceeds the driver's limits or memory.
     """

@@ -72,8 +72,8 @@ def _points_that_show(strands, lengths):
     """Return (N,) fewest evenly chosen points that show the bends of `StrandsOnGPU`; lengths: (N,) of strands
     [samples].
 
-    All points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is longer
-    than the chord by the fraction 8/3 (s / c)².
+    Returns all points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is
+    longer than the chord by the fraction 8/3 (s / c)².
     """
     pieces, enough = strands.point_count - 1, np.full(len(lengths), strands.point_count)
     are_shown = np.ones(len(lengths), bool)
@@ -91,9 +91,10 @@ def _points_that_show(strands, lengths):
 
 def _sizes_in(view, strands, to_world):
     """Return (N,) samples per unit at the nearest strand and (N,) diameters [samples] of `StrandsOnGPU` at (N, 4, 4)
-    places: of hair with an uneven scale, along the axis that is scaled least.
+    places.
 
-    Both are very large if the viewer is inside of the hair's sphere.
+    The diameter of hair with an uneven scale is measured along the axis with the smallest scale. Both numbers are very
+    large if the viewer is inside of the hair's sphere.
     """
     centres, radii = drawing.bounding_spheres(strands, to_world)
     per_unit = np.full(len(to_world), float(view["pixels_per_unit"]))

@@ -52,7 +52,7 @@ class ShadowMaps:
         self._sphere = None  # bounding sphere that the maps were last aimed at
         self._views = {}  # index of a light outside of the hair → (inputs of `_aim`, view, members that it wrote)
         self._surfaces = {}  # layer → inputs that its surfaces were drawn with
-        self._linked = (), []  # surfaces that were drawn last, and the same joined
+        self._linked = (), []  # the surfaces of the last map, and `linked` of them
         self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands
         # Targets of drawing, which are then filtered into a map.
         self._surface_depth = _array(size, 1, "RG32F")  # depth and color of surfaces
@@ -177,7 +177,7 @@ class ShadowMaps:
         return True
 
     def _linked_surfaces(self, surfaces):
-        """Return `surface_textures.linked` surfaces, which are the same for most lights."""
+        """Return `surface_textures.linked` of surfaces; the last result is reused, as most lights have the same."""
         if self._linked[0] != surfaces:
             self._linked = surfaces, surface_textures.linked(surfaces, has_color=True)
         return self._linked[1]
@@ -292,7 +292,7 @@ def _linked(hair):
 
 
 def _records(strands, view, to_world, steps, is_steady):
-    """`drawing.strand_records` of strands, thickened to compensate for the length that fewer points lose.
+    """Return `drawing.strand_records` of strands, thickened to compensate for the length that fewer points lose.
 
     Strands at rest are drawn with the fewest points that show them.
     """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linked hair objects, which share strands and look, drawn together: their number does not change the number of calls.
+"""Drawing of linked hair objects, which share strands and look: the number of calls does not grow with the objects.
 
-The objects' transforms and levels of detail are in a texture with a row for each: shaders/strands/batch_object.glsl.
+A texture has a row with the transform and the level of detail of each object: see shaders/strands/batch_object.glsl.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,7 +15,7 @@ from .hair_shading import MixedShading, Shading
 from .programs import scene_programs
 from .strand_textures import StrandsOnGPU, run_for_each
 
-# Maximum number of objects with a common array texture: every driver supports as many layers.
+# Maximum number of objects with a common array texture: every driver supports this number of layers.
 MOST_LAYERS = 256
 
 _TEXELS = 12  # per object
@@ -25,8 +25,8 @@ _TEXELS = 12  # per object
 class Batch:
     """Hair objects with the same strands, look, light and textures.
 
-    to_world: (N, 4, 4); indices: (N,) among all hair of a picture; layers: (N,) of each object in the textures of the
-    world's visibility, None for a single object with textures of its own; samplers: {name: texture} of the scene;
+    to_world: (N, 4, 4); indices: (N,) among all hair of a picture; layers: (N,) layer of each object in the textures of
+    the world's visibility, None for a single object with textures of its own; samplers: {name: texture} of the scene;
     steps: `drawing.Steps`, whose numbers may be arrays (N,).
     """
 
@@ -39,9 +39,7 @@ class Batch:
     steps: drawing.Steps = field(default_factory=drawing.Steps)
 
     def part(self, chosen):
-        """Return the batch of the objects among `chosen`, a list of indices of hair; their places in it are the new
-        indices.
-        """
+        """Return the batch of the objects in `chosen`, a list of indices of hair; new indices are places in it."""
         places, within = np.nonzero(np.asarray(chosen)[:, None] == self.indices)
         numbers = self.layers, self.steps.point_count, self.steps.strand_count
         layers, points, strands = (one[within] if isinstance(one, np.ndarray) else one for one in numbers)
@@ -56,7 +54,7 @@ def single(hair, index):
 
 
 def groups_of(keys):
-    """Return [indices] of equal keys, at most `MOST_LAYERS` each, in the order of their first index."""
+    """Return groups [indices] of equal keys, with at most `MOST_LAYERS` indices each, in the order of first indices."""
     groups, current = [], {}
     for index, key in enumerate(keys):
         group = current.get(key)
@@ -70,14 +68,14 @@ def groups_of(keys):
 class Objects:
     """The texture of the objects of a `Batch` that a picture shows, and their work groups.
 
-    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before them.
+    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before these objects.
     """
 
     def __init__(self, records, layers, first_run):
         runs_of_strand = -(-(records["drawn_points"].astype(np.int64) - 1) // scene_programs.RUN_LENGTH)
         strands = records["drawn_strands"].astype(np.int64)
         first_share = -(-strands // drawing.FIRST_SHARE)
-        walked = np.stack([strands, first_share, strands - first_share])  # by `drawing.WALK_ALL` and others
+        walked = np.stack([strands, first_share, strands - first_share])  # rows: WALK_ALL, WALK_FIRST, WALK_OTHERS
         groups = -(-walked * runs_of_strand // scene_programs.RUN_GROUP_SIZE)
         self._group_counts = groups.sum(axis=1)
         runs = strands * runs_of_strand
@@ -98,7 +96,7 @@ class Objects:
         self.count, self.last_segment = len(records), first + strand_count * (points - 1) - 1
 
     def rasterize(self, strands, program, blocks, samplers, images, constants, part=drawing.WALK_ALL):
-        """Run a compute program that rasterizes the segments of all objects: `drawing.rasterize_strands`."""
+        """Run a compute program that rasterizes the segments of all objects; see `drawing.rasterize_strands`."""
         if not self._group_counts[part]:
             return
         with drawing.bound(program, blocks, {**drawing.strand_samplers(strands), **samplers, "objects": self.texture}):

@@ -21,7 +21,7 @@ from .strand_textures import TEXTURE_WIDTH, bare_vertices
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # maximum per row; each is three texels
 _ROW_CORNERS = TEXTURE_WIDTH - 1  # maximum per row
-_ROW_TRANSFORMS = 250  # per row
+_ROW_TRANSFORMS = 250  # transforms in a row of their texture
 
 surface_cache = Cache(capacity=64)  # session_uid of a mesh object → its last drawn `SurfaceOnGPU`
 
@@ -218,7 +218,7 @@ def draw_depth(surface, view, light_block, fragment=_COLORED, clip_planes=None):
 class LinkedSurfaces:
     """`SurfaceOnGPU`s with the same vertices and corners, drawn together as instances.
 
-    bounds: (2, 3) of vertices, as of each surface; to_world: (N, 4, 4).
+    bounds: (2, 3) of the vertices, the same for each surface; to_world: (N, 4, 4) object to world.
     """
 
     def __init__(self, surfaces):
@@ -230,7 +230,7 @@ class LinkedSurfaces:
         self._transforms = driver_textures.new_texture((4 * _ROW_TRANSFORMS, row_count), "RGBA32F", texels)
 
     def draw_depth(self, view, light_block, fragment=_COLORED, clip_planes=None):
-        """`draw_depth` of all surfaces; their color is that of their first part."""
+        """Draw the depth of all surfaces, as `draw_depth` does, in the color of their first part."""
         program = surface_programs.depth_program(fragment, clip_planes is not None, is_linked=True)
         placed = self._first.placed(view)
         placed["surface_color"] = self._first.corners.colors[0][1]
@@ -240,7 +240,7 @@ class LinkedSurfaces:
             self._first.corners.triangles.draw_instanced(program, instance_start=0, instance_count=self._count)
 
     def draw_lit(self, program, view, lights, samplers):
-        """`draw_lit` of all surfaces with a program for linked surfaces."""
+        """Draw all surfaces, as `draw_lit` does, with a program for linked surfaces."""
         blocks = {"view": uniforms.uniform_buffer(self._first.placed(view)), "lights": uniforms.uniform_buffer(lights)}
         textures = self._first.samplers | samplers | {"transforms": self._transforms}
         with drawing.bound(program, blocks, textures):
@@ -248,8 +248,8 @@ class LinkedSurfaces:
 
 
 def linked(surfaces, has_color=False):
-    """Return [`SurfaceOnGPU` or `LinkedSurfaces`]: surfaces with the same data are joined; has_color: unless they have
-    several colors.
+    """Return [`SurfaceOnGPU` or `LinkedSurfaces`]: surfaces with the same data are joined; has_color: surfaces with
+    several colors are not.
     """
     keys = [
         index if has_color and len({color for _count, color in surface.corners.colors}) > 1 else None
@@ -261,7 +261,7 @@ def linked(surfaces, has_color=False):
 
 
 def linked_groups(surfaces, keys):
-    """Return [indices] of surfaces with the same data and equal keys, at most as many as a texture has layers."""
+    """Return groups [indices] of surfaces with the same data and equal keys, as `strand_batches.groups_of`."""
     data = ((id(surface.places), id(surface.normals), id(surface.corners)) for surface in surfaces)
     return strand_batches.groups_of(zip(data, keys, strict=True))
 

@@ -35,7 +35,7 @@ class _Placed:
     windows: np.ndarray  # (N, 4) of `windows`
     layers: np.ndarray | None  # (N,) as of the batch
     is_round: bool  # whether any strand is so wide that its bends and ends are visible
-    first_run: int  # number of runs of segments before them
+    first_run: int  # number of runs of segments before these objects
 
     @cached_property
     def view(self):

@@ -144,7 +144,7 @@ def curves_on(surface: Object, kind: str) -> list[Curves]:
 
 
 def grown_on(surface: Object) -> list[Curves]:
-    """Return all hair Curves that grow on a mesh object except deleted ones; their guides may be there alone."""
+    """Return all hair Curves that grow on a mesh object except deleted ones, even if only their guides are on it."""
     found = [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and curves.grown_on(c) == surface]
     return [hair for hair in found if is_shown(hair)]
 

@@ -79,7 +79,7 @@ def read(
 
 def _limited(details, name, value):
     """Return the `Param` of a setting, with a smallest value in place of zero for a setting that must be positive, or
-    whose zero is no limit.
+    for which zero means no limit.
     """
     least = _LEAST_LOCK if details.is_structural else _LEAST
     may_be_zero = details.above == -np.inf and name != _UNLIMITED_AT_ZERO
@@ -89,7 +89,7 @@ def _limited(details, name, value):
 _UNLIMITED_AT_ZERO = "to_length"  # of the style Trim
 
 
-_LEAST, _LEAST_LOCK = 1e-3, 0.1  # of the setting; of a size of locks, as small locks are many
+_LEAST, _LEAST_LOCK = 1e-3, 0.1  # fractions of the setting; the second is for sizes of locks
 
 
 def are_same(numbers: Numbers, others: Numbers) -> bool:

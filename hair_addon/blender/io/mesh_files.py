@@ -166,7 +166,7 @@ def _open_blend(path, runs_scripts):
 
 
 def _is_y_up(path, ending):
-    """Whether Y points up: always in glTF by specification and in Alembic by convention; USD and FBX files store it."""
+    """Return whether Y points up: in glTF by specification, in Alembic by convention; USD and FBX store the axis."""
     if ending == ".fbx":
         with path.open("rb") as file:
             stored = _FBX_UP.search(file.read(_FBX_START))

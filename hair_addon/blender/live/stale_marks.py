@@ -170,8 +170,8 @@ def images_of(target):
 def follow_images(target, depsgraph):
     """Mark guides or hair as stale if their images were painted. Roots wait until Texture Paint is left.
 
-    Blender also reports images that did not change, as after undo: made again, hair of a surface that was scaled
-    meanwhile would be other hair.
+    Blender also reports unchanged images, for example after undo. Regenerating hair for these would change the hair of
+    a surface that has been scaled since.
     """
     state = target.vellus
     masking = text_of(state.guides if state.kind == "GUIDES" else state.hair, "density_image")
@@ -211,8 +211,8 @@ def follow_mapped_surfaces(surfaces):
 
 
 def follow_wet_places(surfaces, images):
-    """Mark the simulation of guides whose wetness differs by a mask on any of some surfaces, or by any of some images,
-    which may have been painted.
+    """Mark the simulation of guides as stale if a mask of their wetness may have been painted: an image among `images`,
+    or a mask on a surface among `surfaces`.
     """
     for hair in bpy.data.hair_curves if surfaces or images else ():
         guides = hair.vellus.guide_curves

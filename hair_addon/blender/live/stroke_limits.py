@@ -36,7 +36,7 @@ def limited(guides, points, depsgraph):
 
 
 def _is_edited(guides, points):
-    """Whether an artist edits limited guides with points (N, 3): neither settings nor layers have just moved them."""
+    """Return whether an artist moved limited guides to points (N, 3), and no setting or layer did."""
     if not guides.vellus.keeps_outside and frozen_points.FROZEN not in guides.attributes:
         return False
     if attributes.is_from_library(guides):

@@ -65,8 +65,8 @@ class DrawnScene:
 
     @cached_property
     def batches(self):
-        """[`strand_batches.Batch`] of all hair, without the steps and shadow maps of a view: linked hair is drawn at
-        once.
+        """[`strand_batches.Batch`] of all hair, without the steps and shadow maps of a view; linked hair is in one
+        batch.
         """
         layers = ambient_visibility.layers(_placed(self.hair))
         keys = [self._key(index) for index in range(len(self.hair))]
@@ -94,7 +94,7 @@ class DrawnScene:
     @cached_property
     def shadowed(self):
         """[(`SurfaceOnGPU` or `LinkedSurfaces`, their `uniforms.LIGHTS`, {sampler: texture} of the world's visibility,
-        whether hair darkens them)] of `surfaces` in a viewport: linked surfaces are drawn at once.
+        whether hair darkens them)] of `surfaces` in a viewport; linked surfaces are joined.
         """
         surfaces, count = [surface for surface, _parts in self.surfaces], len(self.surfaces)
         lights = [self.lights] * count if self.surface_lights is None else self.surface_lights[:count]
@@ -112,7 +112,7 @@ class DrawnScene:
 
     @cached_property
     def looks(self):
-        """`Shading`s of all hair: both layers of hair that is wet in places, as their mix may change."""
+        """`Shading`s of all hair; of hair that is wet in places, both layers, as their mix may change."""
         return tuple(layer for _strands, shading, *_ in self.hair for layer, _mix in shading.layers)
 
     @cached_property

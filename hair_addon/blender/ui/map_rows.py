@@ -24,7 +24,7 @@ def button(layout, state, setting):
 
 
 def draw(layout, item, hair):
-    """Draw the rows of a map of hair Curves; gray, below the reason, if these are linked or overridden."""
+    """Draw the rows of a map of hair Curves; if these cannot be edited, the rows are gray below the reason."""
     try:
         curves.require_editable(hair)
     except HairError as error:

@@ -18,7 +18,7 @@ def _draw_settings(_context, layout, tool):
 
 
 def _tool(mode):
-    """Return the class of the tool in a mode, as each mode has a toolbar of its own."""
+    """Return the class of the tool for a mode, as each mode has its own toolbar."""
     members = {
         "__doc__": "Drag over the surface to turn guides along the stroke",
         "bl_space_type": "VIEW_3D",

@@ -16,7 +16,7 @@ from .polygon_mesh import PolygonMesh
 from .texels import NO_STRAND, PlacedStrands
 
 _CAP_REACH = 0.25  # part of the strands, from the root, on cards that lie on the surface
-_FEW = 8  # lines that are compared with a line at first, its own included
+_FEW = 8  # number of lines that each line is compared with first, including its own
 _AT_ONCE = 100_000  # pairs of lines in a batch
 _TINY = 1e-6  # [m]
 
@@ -148,10 +148,10 @@ def _outermost(points, features, clump_count, count):
 
 
 def _nearest_others(lines, middles, own):
-    """Return mean distances (N,) between lines (N, P, 3) and the nearest of middles (C, P, 3) but their own (N,).
+    """Return the mean distance (N,) of each line (N, P, 3) from the nearest of middles (C, P, 3) except its own (N,).
 
-    Lines are at least as far apart as their centers, so that lines with near centers are compared, and more of them
-    only while others may be nearer.
+    The distance of two lines is at least the distance of their centers. So each line is compared with the middles whose
+    centers are nearest, and with more of them only while another one may be nearer.
     """
     centers = middles.mean(axis=1)
     origin = centers.mean(axis=0)

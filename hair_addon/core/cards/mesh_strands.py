@@ -26,8 +26,8 @@ _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
-_MOST_FACES = 20_000  # of a piece: larger ones beside smaller ones are bodies
-_MOST_SCULPTED = 500_000  # of a piece of a mesh without smaller ones: ten seconds
+_MOST_FACES = 20_000  # of a piece: larger pieces beside smaller pieces are bodies
+_MOST_SCULPTED = 500_000  # of a piece, if all pieces are larger than `_MOST_FACES`; takes ten seconds
 
 
 @dataclass(frozen=True)

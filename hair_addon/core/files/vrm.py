@@ -36,7 +36,7 @@ _OTHERS_OF_SIDES = {
     "Eye": ("eye",),
 }
 
-# The parent of each bone, without sides; if a humanoid lacks it, the parent of the parent.
+# The parent of each bone, without sides. If a humanoid lacks the parent, the parent of the parent is used.
 _PARENTS = {
     "spine": "hips",
     "chest": "spine",

@@ -24,7 +24,7 @@ class PaintedFlow:
         self._roots, self._normals = np.asarray(roots, np.float64), np.asarray(normals, np.float64)
         self._radius, self._strength = radius, strength
         self._mean = np.zeros((len(roots), 3))
-        self.shares = np.zeros(len(roots))  # of the turn, in [0, 1]
+        self.shares = np.zeros(len(roots))  # fraction of the turn, in [0, 1]
 
     @property
     def directions(self) -> np.ndarray:
@@ -54,7 +54,10 @@ class PaintedFlow:
 
 
 def joined_flow(first: PaintedFlow, second: PaintedFlow) -> tuple[np.ndarray, np.ndarray]:
-    """Return (directions (G, 3), shares (G,)) of two strokes at once, in any order, such as a stroke and its image."""
+    """Return (directions (G, 3), shares (G,)) of two strokes that act at once, such as a stroke and its mirror image.
+
+    The order of the strokes does not matter.
+    """
     total = first.shares + second.shares
     mean = first.shares[:, None] * first.directions + second.shares[:, None] * second.directions
     agreement = np.linalg.norm(mean, axis=1) / np.where(total > 0.0, total, 1.0)
@@ -74,14 +77,14 @@ def turned_along(
     flow = unit(flow - np.sum(flow * normals, axis=1, keepdims=True) * normals)
     lean = unit(np.asarray(points[:, -1], np.float64) - points[:, 0])
     shares = np.where(lean.any(axis=1) & flow.any(axis=1), np.asarray(shares, np.float64), 0.0)
-    # About the normal, as far as the guide leans to a side.
+    # Turn about the normal, if the guide leans to a side.
     height = np.clip(np.sum(lean * normals, axis=1), -1.0, 1.0)
     side = lean - height[:, None] * normals
     leaning = _smoothstep(np.linalg.norm(side, axis=1) / _LEANING)
     azimuth = np.arctan2(np.sum(normals * np.cross(side, flow), axis=1), np.sum(side * flow, axis=1))
     around = _rotations(normals, leaning * shares * azimuth)
     lean = np.einsum("sij,sj->si", around, lean)
-    # Toward the surface, as far as the guide is steeper than the lift.
+    # Turn toward the surface, if the guide is steeper than the lift.
     side = unit(lean - height[:, None] * normals)
     ahead = unit(leaning[:, None] * side + (1.0 - leaning[:, None]) * flow)
     rise = np.minimum(np.arcsin(height), settings.lift)[:, None]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The color of light that a body emits by its temperature."""
+"""The color of the light of a black body at a temperature."""
 
 import numpy as np
 
-LEAST, MOST = 2000.0, 12000.0  # [K] Cycles' color is constant above; below, the approximation is off by more than 2 %
+# [K] Cycles' color is constant above `MOST`. Below `LEAST`, the approximation is off by more than 2 %.
+LEAST, MOST = 2000.0, 12000.0
 
 _SECOND_RADIATION = 1.438776877e-2  # [m K]
 _TO_RGB = np.array(  # CIE XYZ → linear Rec. 709
@@ -16,9 +17,9 @@ _TO_RGB = np.array(  # CIE XYZ → linear Rec. 709
 
 
 def blackbody_color(temperature: float) -> np.ndarray:
-    """Return linear RGB (3,) with a luminance of 1 of a black body; temperature [K], at most `MOST`.
+    """Return the linear RGB (3,) of a black body, with a luminance of 1; temperature: [K], limited to `MOST`.
 
-    Planck's law times the color matching functions.
+    The color is the sum of Planck's law times the color matching functions.
     """
     wavelengths = np.arange(360.0, 831.0) * 1e-9
     exponents = _SECOND_RADIATION / (wavelengths * min(temperature, MOST))

@@ -122,7 +122,7 @@ class Step:
     """A row of a program: one run of a .strand file.
 
     kind: a key of `kinds.STEPS`; numbers: values of the file's own parameters, by the names in `NUMBERS` of its module;
-    amount, keep_length, profile, numbers: with arrays (S,) in place of floats that differ between strands;
+    amount, keep_length, profile, numbers: floats that differ between strands are arrays (S,);
     level: level of the clump centers that the step needs, counted from its style's first; None for a style above;
     place, part: indices of its style in the stack, and of the step among the steps of this style.
     """
@@ -162,7 +162,7 @@ def profile_of(settings: StyleSettings) -> Profile:
 
 
 def of_each(function: Callable[[float], float], values: Any) -> Any:
-    """Return a function of a float, or (S,) of each number of an array, with the bits of the float's."""
+    """Return the value of a function for a float, or for each number of an array (S,), with the same bits."""
     if not isinstance(values, np.ndarray):
         return function(values)
     distinct, places = np.unique(values, return_inverse=True)

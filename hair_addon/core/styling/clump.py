@@ -112,7 +112,7 @@ def sizes(settings: Settings) -> list[float]:
 def amounts(settings: Settings) -> list[Any]:
     """Return the strength of each level's locks, the largest first. All are zero if the amount is zero.
 
-    Arrays (S,) if the settings differ between strands.
+    Strengths are arrays (S,) if the settings differ between strands.
     """
     parts = [level / max(settings.levels - 1, 1) for level in range(settings.levels)]
     return [np.minimum(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]

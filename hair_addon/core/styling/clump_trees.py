@@ -77,13 +77,13 @@ class ClumpTrees:
         return self._levels[tree]
 
     def _of_same_sites(self, tree):
-        """Return the known levels of a tree with the same sites and another crossover; None if there is none."""
+        """Return the known levels of a tree with the same sites and another crossover; None without such a tree."""
         alike = (known for known in self._levels if replace(known, crossover=tree.crossover) == tree)
         known = next(alike, None)
         return None if known is None else self._levels[known]
 
     def _joined(self, bindings):
-        """Return the `HairBinding` of the centers of a level of several trees, one after the other."""
+        """Return the `HairBinding` of the centers of a level of several trees, one tree after the other."""
         roots = bindings[0].roots
         for binding in bindings[1:]:
             roots = roots.joined(binding.roots)
@@ -154,7 +154,7 @@ class ClumpTrees:
         return self._members[key]
 
     def _chosen(self, tree, level, rows, choice):
-        """Return (S,) the centers of strands on a level of a tree with variants; rows: by each variant (S,)."""
+        """Return the centers (S,) of strands on a level of a tree with variants; rows: centers (S,) of each variant."""
         return np.choose(choice, self._shifted(tree, level, rows)).astype(np.int32)
 
     def _shifted(self, tree, level, rows):

@@ -126,6 +126,6 @@ def steps(settings: Settings, _cutters: Mapping[str, Cutter]) -> list[Step]:
 
 
 def _per_size(gain, octaves):
-    """Return the factor with which each coordinate of ρ has the amplitude as its root mean square."""
+    """Return the factor that makes the root mean square of each coordinate of ρ equal the amplitude."""
     gains = gain ** np.arange(octaves)
-    return (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5  # the square of a wave is one half
+    return (0.5 * WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5  # the mean square of a wave is one half

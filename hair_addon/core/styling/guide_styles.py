@@ -30,8 +30,8 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Lean:
     """One style on guides.
 
-    settings: of the style; amounts (G,): of each guide; profiles: a `Profile` of all guides, or one of each; None for
-    the course of wet hair; directions (G, 3): unit; clearances (G,) [m].
+    settings: of the style; amounts (G,): of each guide; profiles: one `Profile` for all guides, or one for each; None
+    for the course of wet hair; directions (G, 3): unit; clearances (G,) [m].
     """
 
     settings: StyleSettings
@@ -51,7 +51,7 @@ class Lean:
         return is_same and all(np.array_equal(*pair) for pair in arrays)
 
     def course(self, chosen: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return the part of the amount (M, P) of guides with indices chosen (M,) at x (M, P), as of `evaluated`."""
+        """Return the part (M, P) of the amount of guides with indices chosen (M,) at x (M, P), as for `evaluated`."""
         if self.profiles is None:
             return np.clip(x / _WET_ROOT, 0.0, 1.0)
         if len(self.profiles) == 1:
@@ -73,7 +73,8 @@ def leans(
     """Return the `Lean` of each style that acts on guides, in order.
 
     roots: of the guides; identities: (G,) int32 IDs; masks: (G,) weights by their keys; targets: unit (3,) directions
-    by objects' names; numbers: that differ between guides, by (index of the style, name of the setting).
+    by objects' names; numbers: maps of numbers that differ between guides, by (index of the style, name of the
+    setting).
     """
     found = []
     for place, declared in enumerate(styles):
@@ -97,12 +98,12 @@ def leans(
 
 
 def _of_all(value, count):
-    """Return (G,) float32 of a number of guides, or of an array (G,)."""
+    """Return (G,) float32 of one number for all guides, or of an array (G,)."""
     return np.broadcast_to(np.asarray(value, np.float32), count)
 
 
 def _profiles(settings, count):
-    """Return the `Profile` of all guides, or one of each if its numbers differ between guides."""
+    """Return one `Profile` for all guides, or one for each if its numbers differ between guides."""
     profile = base.profile_of(settings)
     numbers = [getattr(profile, field.name) for field in fields(profile)]
     if not any(isinstance(number, np.ndarray) for number in numbers):

@@ -122,8 +122,8 @@ def compiled(
 
 
 def numbers_of(step: Step) -> list[Any]:
-    """Return a step's numbers, the `SHARED` ones first, in the order in which kernels read them; arrays if they differ
-    between strands.
+    """Return a step's numbers, the `SHARED` ones first, in the order in which kernels read them; numbers that differ
+    between strands are arrays.
     """
     profile = step.profile
     along = profile.root, profile.tip, profile.exponent, 1.0 * profile.is_flipped, profile.start

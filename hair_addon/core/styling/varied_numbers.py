@@ -6,7 +6,8 @@ one equation, and an array of equal values gives the bits of the value.
 
 Where sizes of locks differ, each size has a clump tree of its own over the whole surface, and a strand belongs to locks
 of the tree of its own size. So locks of one size are where they are in hair with this size everywhere. More than
-`MOST_SIZES` sizes are replaced by as many sizes in equal ratios. Other numbers of clump trees are treated alike.
+`MOST_SIZES` sizes are replaced by at most `MOST_SIZES` sizes in equal ratios. Other numbers of clump trees are treated
+alike, with equal differences.
 """
 
 import itertools
@@ -31,7 +32,7 @@ class NumberMap:
 
     read: a function of roots (S,), IDs (S,) int32 and the clumps (S,) int32 of strands, None if unknown, that returns
     (S,) float64 in the setting's unit and range; is_of_places: whether values belong to places of the surface, so that
-    the strands of a lock take that of the lock's center.
+    the strands of a lock take the value at the lock's center.
     """
 
     read: Callable[[SurfacePoints, np.ndarray, np.ndarray | None], np.ndarray]
@@ -115,7 +116,7 @@ class _Structural:
 class VariedTree:
     """The tree of a style whose locks differ in size between strands.
 
-    parts: its numbers; tree: with a variant for each combination of their values, the last number first.
+    parts: the numbers that differ; tree: has a variant for each combination of their values, the last number fastest.
     """
 
     parts: tuple[_Structural, ...]
@@ -156,8 +157,8 @@ def varied_trees(
 def _values_of_trees(read, lengths, own):
     """Return the values of each number, rising, with at most `MOST_SIZES` combinations.
 
-    read: [(S,)] of strands; own: values of the settings. Many values become steps from the setting, so that a map that
-    is painted goes on with the trees of its former values.
+    read: [(S,)] of strands; own: values of the settings. Many values are replaced by steps from the setting, so that a
+    painted map reuses the trees of its former values.
     """
     found = [np.unique(values) for values in read]
     if math.prod(map(len, found)) > MOST_SIZES:
@@ -173,7 +174,8 @@ def _values_of_trees(read, lengths, own):
     ]
 
 
-_RATIO, _STEP = 10.0 ** (1.0 / (MOST_SIZES - 1)), 1.0 / MOST_SIZES  # of neighboring lengths; between other values
+# Ratio of neighboring lengths; difference of other neighboring values.
+_RATIO, _STEP = 10.0 ** (1.0 / (MOST_SIZES - 1)), 1.0 / MOST_SIZES
 
 
 def _steps(values, is_length, own):

@@ -48,7 +48,7 @@ class Settings(StyleSettings):
     relax: float = param(
         0.8, "How far water straightens curls and waves", low=0.0, high=1.0, subtype="FACTOR", may_vary=True
     )
-    vary: float = param_of(StyleSettings, "vary", may_vary=False)  # of the shading too
+    vary: float = param_of(StyleSettings, "vary", may_vary=False)  # the shading varies by it too
     swelling: float = param(0.15, "Increase of the radius of a soaked strand", low=0.0, high=1.0, subtype="FACTOR")
 
 

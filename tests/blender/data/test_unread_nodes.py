@@ -58,7 +58,7 @@ def test_constant_nodes_of_lights_are_read_without_a_sentence(lamp):
 
 
 def test_nodes_that_compute_constants_light_as_in_cycles(lamp, tmp_path):
-    """A plane below a lamp with Blackbody, Math and Light Falloff has the light of Cycles within 2 %."""
+    """A plane below a lamp with Blackbody, Math and Light Falloff receives the light of Cycles within 2 %."""
     light, emission = lamp
     tree, scene = light.node_tree, bpy.context.scene
     bpy.context.object.location.z = 2.0

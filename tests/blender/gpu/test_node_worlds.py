@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of worlds of nodes compared with Cycles: Sky Texture, a color ramp with a mapping, noise, an image."""
+"""Light of worlds with nodes compared with Cycles: Sky Texture, a color ramp with a mapping, noise, an image."""
 
 import bpy
 import numpy as np

@@ -17,14 +17,14 @@ RADIUS = 0.5
 
 @pytest.fixture
 def guides(hair):
-    """Return the guides of the sphere as the active object."""
+    """Make the guides of the sphere active, and return them."""
     found = bpy.data.objects["Guides"]
     bpy.context.view_layer.objects.active = found
     return found
 
 
 def arc(reach=0.7, radius=1.0, side=0.3):
-    """Return points of a stroke over the top of a sphere, from -X to +X, as an operator takes them."""
+    """Return points of a stroke over the top of a sphere, from -X to +X, in the form that operators take."""
     angles = np.linspace(-reach, reach, 15)
     way = np.stack([np.sin(angles), np.full(15, side), np.cos(angles)], axis=1)
     return radius * way / np.linalg.norm(way, axis=1, keepdims=True)

@@ -130,7 +130,7 @@ def test_hair_of_a_file_that_moves_plays_all_of_its_frames(scene, sphere, lines,
 
 
 def test_a_failed_import_leaves_nothing(hair, tmp_path, monkeypatch):
-    """If the hair of a groom cannot be made after its guides, no object and no Curves of them stay."""
+    """If the hair of a groom cannot be made after its guides, no object and no Curves remain."""
     api.export_groom(tmp_path / "groom.abc", [hair])
     before = {*bpy.data.objects}, {*bpy.data.hair_curves}
     made, real = [], curve_objects.new_object

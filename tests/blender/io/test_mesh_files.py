@@ -13,7 +13,7 @@ from tests.support.commands import TETRAHEDRON, distance_to, load, run_here, wri
 from tests.support.pairs import pairs
 
 VERTICES, TRIANGLES = TETRAHEDRON
-# Of Blender's exporter of FBX.
+# A warning of Blender's FBX exporter.
 pytestmark = pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")
 
 MOVED = np.array([5.0, -1.0, 2.0])
@@ -146,7 +146,7 @@ def blend(path):
 
 def fbx(forward, up):
     def write(path):
-        """Write FBX with Blender, whose unit is the centimeter there."""
+        """Write an FBX file with Blender, which uses centimeters in it."""
         build(1.0)
         bpy.ops.export_scene.fbx(filepath=str(path), axis_forward=forward, axis_up=up)
         x, y, z = (VERTICES + MOVED).T

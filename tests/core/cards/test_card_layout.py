@@ -50,8 +50,8 @@ def test_some_cards_are_clumps_whatever_the_parts(count, parts):
 
 
 def test_flyaways_are_far_from_the_nearest_other_strand_by_few_comparisons(monkeypatch):
-    """Of strands in clumps of their own, those farthest from the nearest other clump are flyaways; few are compared,
-    and no more for each strand if there are more strands.
+    """Among strands in clumps of their own, the farthest from the nearest other clump are flyaways; each strand is
+    compared with few clumps, and with no more of them if there are more strands.
     """
 
     def counted(line, lines):

@@ -58,7 +58,7 @@ def test_missing_bones_are_named():
 
 
 def test_nodes_of_bones_are_moved_below_their_parents_and_stay_in_place():
-    """A leg below a control moves below the hips, with its own children and the same matrices; its animation goes."""
+    """A leg below a control moves below the hips, with its children and the same matrices; its animation is removed."""
     turn = [0.0, 0.6, 0.0, 0.8]
     nodes = [
         {"name": "root", "children": [1, 2], "scale": [0.01, 0.01, 0.01]},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides near a painted stroke turn toward its direction, with their roots and lengths."""
+"""Guides near a painted stroke turn toward its direction, and keep their roots and lengths."""
 
 from itertools import pairwise
 

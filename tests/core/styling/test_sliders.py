@@ -77,8 +77,8 @@ def sliders():
 
 
 def cases():
-    """Return each slider on each grooming; one grooming for the first and every sixth slider of a style is not
-    `long`.
+    """Return each slider on each grooming; all are marked `long` except one grooming for the first and every sixth
+    slider of a style.
     """
     counts = Counter()
     for place, (settings_class, name) in enumerate(sliders()):

@@ -54,14 +54,14 @@ def hair():
 
 @pytest.fixture
 def halves(hair):
-    """Return a function: (S,) whether roots are in the second half of the head."""
+    """Return a function that returns (S,) whether roots are in the second half of the head."""
     corners = hair.mesh.vertices[hair.mesh.triangles][..., 0]
     return lambda roots: (corners[roots.triangle] * roots.barycentric).sum(axis=1) > 0.0
 
 
 @pytest.fixture
 def varied(halves):
-    """Return a function: the `NumberMap` of a value in each half of the head."""
+    """Return a function that returns a `NumberMap` with a value for each half of the head."""
 
     def made(values, is_of_places=False):
         return NumberMap(

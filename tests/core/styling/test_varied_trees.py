@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sizes of locks that differ between strands: each strand is in the lock of hair with the strand's size everywhere."""
+"""Where sizes of locks differ, each strand is in the same lock as in hair with the strand's size everywhere."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ def hair():
 
 @pytest.fixture
 def places(hair):
-    """Return a function: (S,) the place of roots from one side of the head to the other [m]."""
+    """Return a function that returns the places (S,) of roots from one side of the head to the other [m]."""
     corners = hair.mesh.vertices[hair.mesh.triangles][..., 0]
     return lambda roots: (corners[roots.triangle] * roots.barycentric).sum(axis=1)
 
@@ -74,7 +74,7 @@ def test_each_half_has_the_locks_of_its_own_size(hair, places, name):
 
 
 def test_one_size_is_the_setting(hair):
-    """Equal sizes of all strands give the tree and the bits of the size, also if the setting has another value."""
+    """A map of one size has the bits of hair whose setting is this size, also if its own setting differs."""
     number = NumberMap(lambda roots, _ids, _clumps: np.full(len(roots), 0.02))
     style = clump.Settings(size=0.05)
     found = hair.styled(style, inputs=Inputs(numbers={(0, "size"): number}))
@@ -82,14 +82,14 @@ def test_one_size_is_the_setting(hair):
 
 
 def test_many_sizes_are_few_trees(hair, places):
-    """Sizes of a gradient are replaced by few sizes in equal ratios; strands have the nearest."""
+    """Sizes of a gradient are replaced by few sizes in equal ratios; each strand has the nearest size."""
     number = NumberMap(lambda roots, _ids, _clumps: 0.03 + 0.5 * np.abs(places(roots)))
     style = clump.Settings()
     tree = varied_trees([style], {(0, "size"): number}, hair.binding)[0]
     assert 3 <= len(tree.tree.variants) <= MOST_SIZES
     other = NumberMap(lambda roots, _ids, _clumps: np.minimum(number.read(roots, None, None), 0.045))
     painted = varied_trees([style], {(0, "size"): other}, hair.binding)[0]
-    assert set(painted.tree.variants) < set(tree.tree.variants)  # a painted map goes on with its trees
+    assert set(painted.tree.variants) < set(tree.tree.variants)  # a painted map reuses its trees
     sizes = number.read(hair.binding.roots, None, None)
     trees = np.array([variant.sizes[0] for variant in tree.tree.variants])
     ratios = trees[tree.choice(hair.binding, None)] / sizes

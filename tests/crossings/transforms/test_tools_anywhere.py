@@ -67,7 +67,7 @@ def test_tools_do_the_same_in_the_world(placed_files, place, name):
     as_it_is = after_tool(path, tool, values, False)
     # An applied body is 3 m from its origin: single precision turns segments of a body of 1 cm by a part in 300.
     tolerances = {"points": 0.02, "lengths": 0.01} if applied.size < 0.1 else {"points": 1e-3}
-    # Roots are relaxed until they move no more than that; pushes follow the last bits, and curls turn with guides.
+    # Relaxation stops when roots move less than this. Pushes depend on the last bits, and curls turn with guides.
     if name[-1] in {"more", "push_outside"}:
         tolerances = {"points": 0.02, "lengths": 0.01}
     require_carried(applied, as_it_is, names=["Guides"] if name[-1] == "more" else ["Guides", "Hair"], **tolerances)

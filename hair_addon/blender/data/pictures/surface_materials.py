@@ -128,7 +128,7 @@ _READERS = {
 
 
 class _Noted:
-    """A `ShaderNode` that notes the names of its inputs that are read."""
+    """A `ShaderNode` that records the names of the inputs that a reader reads."""
 
     def __init__(self, sockets):
         self._sockets, self.names = sockets, []
@@ -139,7 +139,7 @@ class _Noted:
 
 
 def inputs_read(sockets, material):
-    """Return the names of the inputs of a `ShaderNode` that the reader of its type reads; None for other types."""
+    """Return the names of the inputs that the reader of a `ShaderNode` reads; None for types without a reader."""
     if sockets.type not in _READERS:
         return None
     noted = _Noted(sockets)

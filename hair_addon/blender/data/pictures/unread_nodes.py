@@ -50,10 +50,10 @@ def _inputs_of(material):
 
 
 def _unread_of(tree, read, textures):
-    """Return the labels of nodes before a tree's output that are not read.
+    """Return the labels of the nodes that a tree's output depends on and that are not read.
 
-    read: from a `ShaderNode` to its inputs that are read, None without any; textures: types of other nodes that are
-    read.
+    read: a function that returns the names of the inputs of a `ShaderNode` that are read, None if the node is not read;
+    textures: types of other nodes that are read.
     """
     output = None if tree is None else tree.get_output_node("ALL")
     if output is None:

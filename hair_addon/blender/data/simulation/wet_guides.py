@@ -52,7 +52,7 @@ def places(guides, known):
 
 
 def are_others(now, before, guides):
-    """Return whether `places` have other weights than before, or other masks while no wetness is keyed."""
+    """Return whether weights of `places` differ from those before, or masks differ while no wetness is keyed."""
     if now.keys() != before.keys() and not shared_wetness.is_keyed(guides.vellus):
         return True
     return any(key in before and not np.array_equal(weights, before[key]) for key, weights in now.items())

@@ -209,7 +209,7 @@ def shading_program(
 
 
 def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False, is_batch=False):
-    """Info of a program that includes visibility/strand_samples.glsl.
+    """Return the info of a program that includes visibility/strand_samples.glsl.
 
     samplers: (name, type), ... besides the scene's; texture_format: of the image that it fills; is_mixed: whether it
     also reads the image; is_batch: of linked hair objects.

@@ -29,8 +29,8 @@ _LAYER_FILE = "light/write_visibility_layer.glsl"
 def visibility_program(texture_format, in_layer=False):
     """Return the program that sums the visibility of the world from the texels of `places`.
 
-    texture_format: `SUMS`, to which directions are added one by one; `BYTES`: all are added at once; in_layer: bytes
-    are written to a layer of array textures.
+    texture_format: `SUMS` if directions are added one by one, `BYTES` if all are added at once; in_layer: whether
+    bytes are written to a layer of array textures.
     """
     info = _program(texture_format, in_layer)
     scene_programs.declare_scene(info, is_lit=False)
@@ -45,7 +45,7 @@ def visibility_program(texture_format, in_layer=False):
 
 @shaders.cached
 def bytes_program(in_layer=False):
-    """Return the program that converts strands' visibility from `SUMS` to `BYTES`; in_layer: of array textures."""
+    """Return the program that converts strands' visibility from `SUMS` to `BYTES`; in_layer: to array textures."""
     info = _program(BYTES, in_layer)
     for slot, name in enumerate(scene_programs.VISIBILITY_SAMPLERS):
         info.sampler(slot, "FLOAT_2D", name)

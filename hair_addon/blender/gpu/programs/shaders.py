@@ -23,7 +23,7 @@ def expand(name, replaced=None, texts=None, first=None):
     """Return (text, lines): the text of a file with every #include expanded once, and each line's (file, number).
 
     replaced: {file: the file to include instead, or None for nothing}; texts: {file: text} of generated files; first: a
-    file that is included before, or None.
+    file that is included before this file, or None.
     """
     text, lines, seen, replaced, texts = [], [], set(), replaced or {}, texts or {}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flow painted by a brush: strokes on the posed surface turn the guides near them, as they are drawn or at once."""
+"""Flow painted by a brush: strokes on the posed surface turn the guides near them, while drawn or at once."""
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Object
@@ -17,9 +17,10 @@ _MOST_POINTS = 10_000  # of a stroke
 
 
 class FlowStroke:
-    """A stroke of the brush: guides as they were before, and the effect of the stroke so far.
+    """A stroke of the brush: the guides before the stroke, and the effect of the stroke so far.
 
-    Each call of `extend` turns the guides anew from where they were, so a stroke has the same result at once.
+    Each call of `extend` turns the guides as they were before the stroke, so one call with all points has the same
+    result.
     """
 
     def __init__(self, datablock: Curves, settings: FlowSettings, depsgraph: Depsgraph) -> None:
@@ -92,7 +93,8 @@ class FlowStroke:
 
 
 def paint(datablock: Curves, stroke: np.ndarray, settings: FlowSettings, depsgraph: Depsgraph) -> int:
-    """Turn guides along a stroke (K, 3) in local coordinates of their posed surface; returns the number turned.
+    """Turn guides along a stroke (K, 3) in local coordinates of their posed surface; returns the number of turned
+    guides.
 
     Raises `HairError` before anything changes.
     """
@@ -104,7 +106,7 @@ def paint(datablock: Curves, stroke: np.ndarray, settings: FlowSettings, depsgra
 
 
 def place_on(surface: Object, origin: np.ndarray, direction: np.ndarray, depsgraph: Depsgraph) -> np.ndarray | None:
-    """Return where a ray in world coordinates first meets a posed surface, (3,) in its local coordinates, or None."""
+    """Return where a ray in world coordinates first hits a posed surface, (3,) in its local coordinates, or None."""
     to_local = surface.matrix_world.inverted_safe()
     start = to_local @ origin
     is_hit, place, _normal, _face = surface.evaluated_get(depsgraph).ray_cast(start, to_local.to_3x3() @ direction)

@@ -81,7 +81,7 @@ def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgr
 
 
 def _pushed_at_rest(datablock, barrier, points, starts, changed):
-    """Return as `pushed_out` on a surface without deformation. Only guides that changed are read: strokes are fast."""
+    """Return the result of `pushed_out` on a surface at rest. Only changed guides are read, as strokes must be fast."""
     counts, local = np.diff(starts), points
     for count in np.unique(counts[(counts > 1) & (changed > 0.0)]):
         places = starts[:-1][(counts == count) & (changed > 0.0)][:, None] + np.arange(count)

@@ -12,8 +12,8 @@ from ...data.pictures import shader_sockets
 from ...host import scene_time
 
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
-SAMPLES = 4  # of a pixel
-SUN_SAMPLES = 16  # of worlds with the sun of a Sky Texture: its disk covers two pixels
+SAMPLES = 4  # per pixel
+SUN_SAMPLES = 16  # per pixel, if a Sky Texture shows the sun: its disk covers two pixels
 
 # Values of the Light Path node for light that hair scatters.
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
@@ -48,7 +48,7 @@ def render(path, frame, out):
 
 
 def _has_sun(tree):
-    """Whether a Sky Texture shows the disk of its sun."""
+    """Return whether a Sky Texture shows the disk of its sun."""
     skies = [one.node for one in shader_sockets.nodes_of(tree) if one.type == "TEX_SKY"]
     return any(sky.sun_disc and sky.sky_type.endswith("SCATTERING") for sky in skies)
 

@@ -145,8 +145,8 @@ def _hues_of_ties(guides):
 def _hues_of_clumps(guide_count, numbers, nearest):
     """Return hues (G,), a random hue for each clump; -1 for guides without a clump, which have the plain color.
 
-    A guide belongs to the clump of most of the strands that it is nearest to. numbers: (S,) in [0, 1), -1 for strands
-    without a clump; nearest: (S,) guides of strands, -1 for none.
+    A guide belongs to the clump of most of its strands: the strands whose nearest guide it is. numbers: (S,) in [0, 1),
+    -1 for strands without a clump; nearest: (S,) nearest guide of each strand, -1 for none.
     """
     hues = np.full(guide_count, -1.0)
     is_valid = (numbers >= 0.0) & (nearest >= 0) & (nearest < guide_count)

@@ -36,7 +36,7 @@ class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
         return context.window_manager.invoke_popup(self, width=280)
 
     def change(self, context):
-        """Add a map without a source if the setting has none; an existing map of linked hair can be looked at."""
+        """Add a map without a source if the setting has no map. Existing maps need no change, also on linked hair."""
         owner = _owner_of(context, self.setting)
         if map_items.item_of(owner.vellus, self.setting) is None:
             require_editable(owner)

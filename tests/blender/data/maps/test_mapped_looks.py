@@ -96,7 +96,7 @@ def test_numbers_are_factors(hair):
 
 
 def test_random_colors_differ_by_place(hair):
-    """A map of *Random Color* gives strands where it is 0 and 1 the colors of grooms with the values at From and To."""
+    """Where a map of *Random Color* is 0 or 1, strands have the colors of a groom with the value at From or To."""
     sphere, curves = bpy.data.objects["Sphere"], hair.data
     group = sphere.vertex_groups.new(name="half")
     group.add([v.index for v in sphere.data.vertices if v.co.x > 0.0], 1.0, "REPLACE")

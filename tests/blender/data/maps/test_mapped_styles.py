@@ -167,8 +167,8 @@ def test_guides_lean_by_their_own_values(hair):
 
 
 def test_sizes_of_locks_by_a_map(hair, window):  # noqa: F811
-    """Each half has the locks of its size, drawn as they are written; a constant map is the size, and another map of
-    the same sizes moves strands.
+    """Each half has the locks of its size, and drawn strands equal written strands; a constant map equals the setting,
+    and another map of the same sizes moves strands.
     """
     setting = "styles.Clump.size"
     api.add_style(hair.data, "CLUMP", size=0.5)

@@ -120,7 +120,7 @@ VARIED = {
 
 @pytest.fixture
 def varied(hair):
-    """Return a function: the `NumberMap` of a value in each half of the head."""
+    """Return a function that returns a `NumberMap` with a value for each half of the head."""
     corners = hair.mesh.vertices[hair.mesh.triangles][..., 0]
 
     def made(pair):

@@ -113,7 +113,7 @@ def test_heads_of_a_linked_library_are_drawn_together(thin, tmp_path):
 
 
 def test_visibility_that_follows_moving_heads_becomes_that_of_heads_at_rest(thin):
-    """After all directions, visibility of the world that is renewed in motion is that of each head at rest."""
+    """Once all directions are renewed in motion, the visibility of the world is that of each head at rest."""
     thin.data.vellus.hair.strand_count = 200
     link(thin, (PLACES[0], PLACES[2]))
     drawn = read()
@@ -155,7 +155,7 @@ class Calls:
 def test_calls_of_a_frame_do_not_grow_with_the_number_of_heads(thin, monkeypatch, is_moved):
     """A pass of 12 heads makes as many calls as one of 3: while a view turns, and at rest with shadows on surfaces.
 
-    Their shadow map has as many draw calls.
+    A shadow map of 12 heads has as many draw calls as a shadow map of 3.
     """
     monkeypatch.setattr(picture_detail, "_MOST_PER_SIDE", 2)  # smaller hair is not drawn in a part of the picture
     thin.data.vellus.hair.strand_count = 200

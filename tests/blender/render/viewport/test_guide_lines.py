@@ -155,7 +155,7 @@ def test_guides_of_a_tie_share_a_color(guides):
 
 
 def test_guides_of_a_clump_share_a_color(guides):
-    """Guides have a color for each clump of their hair, the clump of most of their strands; without, the plain one."""
+    """A guide has the color of the clump of most of its strands; a guide without a clump has the plain color."""
     guides.data.vellus.guide_opacity, guides.data.vellus.guide_colors = 1.0, "PLAIN"
     plain = read(guides)
     guides.data.vellus.guide_colors = "CLUMP"
