@@ -11,7 +11,7 @@ from ...core.errors import HairError
 from ...core.geometry.mesh import SurfacePoints
 from ...core.maps import combination, varied_settings
 from ...core.params import Param
-from ...core.styling import program
+from ...core.styling import lean, program, wet
 from ...core.styling.base import StyleSettings
 from ...core.styling.varied_numbers import NumberMap
 from ..data.maps import ramps, sources
@@ -66,6 +66,8 @@ def read(
             continue
         try:
             settings = map_items.settings_of(item)
+            if not _has_values(settings.kind, styles[place], setting, details):
+                raise HairError(_WITHOUT_VALUES, setting=item.setting)
             if settings.kind == "CLUMP" and not program.tree_levels(styles):
                 raise HairError("There are no clumps for a random map: add the style Clump.")
             ramp = ramps.map_samples(item, False)
@@ -75,6 +77,18 @@ def read(
         except HairError as error:
             status = str(error)
     return found, status
+
+
+_WITHOUT_VALUES = 'Clumps and attributes of strands cannot vary "{setting}": pick another kind of map.'
+
+
+def _has_values(kind, style, name, details):
+    """Whether a kind of map has values where a style reads a number.
+
+    Guides have no clumps and no values of strands, and sizes of locks are known before clumps.
+    """
+    is_of_guides = isinstance(style, lean.Settings) or (isinstance(style, wet.Settings) and name == "cling")
+    return not (kind == "CLUMP" and (is_of_guides or details.is_structural)) and not (kind == "CURVES" and is_of_guides)
 
 
 def _limited(details, name, value):

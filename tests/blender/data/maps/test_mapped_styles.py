@@ -208,3 +208,22 @@ def test_a_black_map_of_the_maximum_length_cuts(hair):
     is_black, is_white = (found[:, 0, 0] < side for side in (-0.15, 0.25))
     assert lengths[is_black].max() < 0.02 and not (found[is_black] == whole[is_black]).all(axis=(1, 2)).any()
     np.testing.assert_array_equal(found[~is_white], whole[~is_white])
+
+
+@pytest.mark.parametrize(
+    ("setting", "source"),
+    [("styles.Lean.tip", "clump"), ("styles.Lean.tip", "curves:mine"), ("styles.Clump.size", "clump")],
+)
+def test_a_map_without_values_says_so(hair, setting, source):
+    """A map by clumps or by an attribute of strands changes no numbers of guides and no sizes of locks, and the status
+    says so; a random number for each strand or guide changes them.
+    """
+    api.add_style(hair.data, "CLUMP", size=0.5)
+    api.add_style(hair.data, "LEAN", amount=0.6)
+    hair.data.attributes.new("mine", "FLOAT", "CURVE")
+    whole = points(hair.data)
+    api.set_map(hair.data, setting, source, low=0.2, high=0.5)
+    np.testing.assert_array_equal(points(hair.data), whole)
+    assert f'cannot vary "{setting}": pick another kind of map.' in hair.data.vellus.status
+    api.set_map(hair.data, setting, "strand", low=0.2, high=0.5)
+    assert not np.array_equal(points(hair.data), whole) and hair.data.vellus.status == ""
