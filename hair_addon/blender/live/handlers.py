@@ -7,7 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import surface_space, usable_surfaces
-from ..data.strands import curves_objects
+from ..data.strands import curves, curves_objects
 from ..groom import frame_faces, hidden_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import memory, running, scene_time
@@ -150,7 +150,7 @@ def _painted(reports):
     found = {o for o in updates.deformed(reports) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
     if not any(report.is_of(bpy.types.Image) for report in reports):
         return found
-    surfaces = {hair.surface for hair in _of_kind("HAIR")} - {None}
+    surfaces = {curves.grown_on(hair) for hair in _of_kind("HAIR")} - {None}
     return found | {surface for surface in surfaces if surface.mode == "TEXTURE_PAINT"}
 
 
@@ -185,7 +185,7 @@ def _mark_painted(images, depsgraph):
     painting = set()
     stale_marks.follow_mapped_images(images)
     for datablock in bpy.data.hair_curves:
-        surface, used = datablock.surface, stale_marks.images_of(datablock)
+        surface, used = curves.grown_on(datablock), stale_marks.images_of(datablock)
         if surface is None or not used:
             continue
         if not datablock.vellus.is_live:
@@ -272,14 +272,15 @@ def _evaluate_hair(hair, depsgraph, combed):
         events.looks_written(hair)
 
 
-def _is_ready(curves, depsgraph):
-    """Whether the surface is missing, or in Object Mode and evaluated.
+def _is_ready(datablock, depsgraph):
+    """Whether the surface is missing, or in Object Mode and evaluated; the surface of the guides also in Object Mode.
 
     Hair waits until edit and paint modes are left, and hair of another scene until that scene is evaluated.
     """
-    return curves.surface is None or (
-        curves.surface.mode == "OBJECT" and usable_surfaces.is_in(curves.surface, depsgraph)
-    )
+    surface, grown_on = datablock.surface, curves.grown_on(datablock)
+    if grown_on is not None and grown_on.mode != "OBJECT":
+        return False
+    return surface is None or (surface.mode == "OBJECT" and usable_surfaces.is_in(surface, depsgraph))
 
 
 def _evaluate_other_scenes(scene):

@@ -342,7 +342,7 @@ def _is_painted(hair, surfaces):
 
 
 def _is_set_while_painting(hair):
-    return hair.vellus.is_stale and hair.surface.mode in painted_masks.PAINT_MODES and not is_ahead(hair)
+    return hair.vellus.is_stale and curves.grown_on(hair).mode in painted_masks.PAINT_MODES and not is_ahead(hair)
 
 
 def update_once(parts, view_layer):

@@ -175,7 +175,7 @@ def follow_images(target, depsgraph):
     """
     state = target.vellus
     masking = text_of(state.guides if state.kind == "GUIDES" else state.hair, "density_image")
-    if not masking or target.surface.mode == "TEXTURE_PAINT":
+    if not masking or curves.grown_on(target).mode == "TEXTURE_PAINT":
         state.is_stale = True
         return
     is_painted = state.status != "" or images_of(target) != {masking}

@@ -96,6 +96,27 @@ def test_settings_of_styles_are_followed_in_the_paint_mode(styled):
     np.testing.assert_allclose(lengths()[inside], 2.0 * before, rtol=2e-2)
 
 
+def test_roots_wait_where_the_guides_are_on_another_surface(styled):
+    """While the guides' surface is painted, styles follow and roots wait until the mode is left, as on one surface."""
+    other = bpy.data.objects.new("Other", sphere().data.copy())
+    bpy.context.collection.objects.link(other)
+    styled.data.surface = other
+    bpy.context.view_layer.update()
+    cut, count = lengths(), len(styled.data.curves)
+    bpy.ops.vellus.paint_style_mask()
+    active_group().mask = ""
+    bpy.context.view_layer.update()
+    active_group().factor = 0.4
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(lengths(), 2.0 * cut, rtol=2e-2)
+    styled.data.vellus.hair.strand_count = count // 2
+    bpy.context.view_layer.update()
+    assert len(styled.data.curves) == count
+    bpy.ops.vellus.paint_style_mask()
+    bpy.context.view_layer.update()
+    assert len(styled.data.curves) == count // 2
+
+
 def test_a_group_that_is_there_is_painted_and_a_lost_one_is_made(styled):
     active_group().mask = "top"
     bpy.context.view_layer.update()
