@@ -266,6 +266,18 @@ def of(datablock: Curves) -> BoundHair | None:
     return binding_cache.get(datablock.session_uid)
 
 
+def with_clumps(guides: Curves) -> BoundHair | None:
+    """Return the first `BoundHair` that follows all guides and has a style that gathers strands, or None.
+
+    None while guides were added or removed that hair does not follow yet.
+    """
+    for bound in filter(None, map(of, curves.followers(guides))):
+        styling = bound.styles.styling
+        if styling is not None and styling.tree_levels and len(bound.guides) == len(guides.curves):
+            return bound
+    return None
+
+
 def has_scale(bound: BoundHair, surface_object: Object | None) -> bool:
     """Whether a surface has the scale that hair was bound at, as styles and spacings are in meters; it may be turned.
 

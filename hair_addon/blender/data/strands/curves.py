@@ -82,6 +82,11 @@ def write_clumps(curves, clumps):
         _write_or_remove(curves, name, data_type, None if clumps is None else clumps[place])
 
 
+def has_clumps(curves):
+    """Whether `write_clumps` has stored clumps."""
+    return attributes.has(curves, "clump_index", "INT", "CURVE")
+
+
 def write_wetness(curves, wetness):
     """Store (S,) float32 wetness of strands, for shaders; None removes it. Returns whether it was added or removed."""
     had_wetness = has_wetness(curves)

@@ -14,7 +14,7 @@ from ...data import rest_nodes, rest_sources, usable_surfaces
 from ...data.strands import curves, curves_objects, delivered_hair, follow_nodes
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
-from .. import frame_faces
+from .. import bindings, frame_faces
 from ..selection import has_object, is_shown
 from . import copied_hair
 
@@ -153,3 +153,14 @@ def sharing_note(hair: Curves) -> str:
     """Return a translated sentence that names other hair with the same guides; empty if there is none."""
     names = ", ".join(name_of(other) for other in copied_hair.sharing(hair))
     return interface_text("Other hair follows the same guides: {names}", names=names) if names else ""
+
+
+def color_note(guides: Curves) -> str:
+    """Return a translated sentence if guides have the color of their clumps only after the hair changes, else empty.
+
+    Clumps are computed with the hair, and unknown in a file that was opened and after undo.
+    """
+    if guides.vellus.guide_colors != "CLUMP" or bindings.with_clumps(guides) is not None:
+        return ""
+    have_clumps = any(curves.has_clumps(hair) for hair in curves.followers(guides))
+    return interface_text("Clumps are colored after the next change of the hair.") if have_clumps else ""

@@ -102,21 +102,18 @@ def _hues_texture(guides):
 
 
 def _texture_of_clumps(guides):
-    """Return a texture with the hues of `_hues_of_clumps` for the first hair that follows the guides and has clumps."""
-    bound = next(filter(_has_clumps, map(bindings.of, curves.followers(guides))), None)
+    """Return a texture with the hues of `_hues_of_clumps` for `bindings.with_clumps`."""
+    bound = bindings.with_clumps(guides)
     if bound is None:
         return _numbers_texture(np.full(len(guides.curves), -1.0))
     numbers = bound.styles.styling.lock_numbers()
     nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
-    source, known = (numbers.tobytes(), nearest.tobytes()), hue_cache.get(guides.session_uid)
+    source = len(guides.curves), numbers.tobytes(), nearest.tobytes()
+    known = hue_cache.get(guides.session_uid)
     if known is None or known[0] != source:
         hues = _hues_of_clumps(len(guides.curves), numbers, nearest)
         known = hue_cache.keep(guides.session_uid, (source, _numbers_texture(hues)))
     return known[1]
-
-
-def _has_clumps(bound):
-    return bound is not None and bound.styles.clumps is not None
 
 
 def _numbers_texture(values):

@@ -4,10 +4,11 @@
 import bpy
 
 from ...groom.selection import object_of, surface_of
+from ...groom.systems.diagnostics import color_note
 from ...groom.systems.hair_systems import edited_system, guides_of_system, systems_of
 from .. import setting_rows
 from ..operators.systems import is_combing
-from .tab import HairTab, draw_combing
+from .tab import HairTab, draw_combing, write
 
 _ROWS = 3  # minimum rows of the list
 
@@ -70,6 +71,9 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
                 row = layout.row(align=True)
                 row.prop(guides.vellus, "guide_colors", text="")
                 row.prop(guides.vellus, "guide_opacity")
+                note = color_note(guides)
+                if note:
+                    write(layout, context, note, "INFO")
 
 
 def _are_shown(guides, view_layer):

@@ -15,6 +15,7 @@ from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import guide_lines
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.strands import ragged_lengths
+from tests.support.interface.layout import draw
 from tests.support.reading import write_points
 
 SIZE = 128
@@ -172,6 +173,48 @@ def test_guides_of_a_clump_share_a_color(guides):
     assert 3 < len(np.unique(found)) < 0.6 * len(found)
     colored = read(guides)
     assert abs(colored - plain).max() > 0.05 and len(hues(plain)) < len(hues(colored))
+
+
+def test_guides_that_hair_does_not_follow_yet_are_not_colored_by_its_clumps(guides):
+    """Guides that were added have no clump, and no number in the texture, until the hair follows them."""
+    hair = api.interpolate_hair(guides, strand_count=400)
+    api.add_style(hair, "CLUMP", size=0.8)
+    guides.data.vellus.guide_colors = "CLUMP"
+    bpy.context.view_layer.update()
+    assert size_of_hues(guides) == len(guides.data.curves)
+    hair.vellus.is_live = False
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.change_guide_count(guide_count=2 * len(guides.data.curves))
+    bpy.context.view_layer.update()
+    assert size_of_hues(guides) >= len(guides.data.curves)
+
+
+def test_the_panel_says_when_clumps_are_unknown(guides):
+    """As after a file was opened or a step was undone, until the hair changes."""
+    hair = api.interpolate_hair(guides, strand_count=400)
+    api.add_style(hair, "CLUMP", size=0.8)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = guides
+    guides.select_set(True)
+    sentence = "Clumps are colored after the next change of the hair."
+    for colors in ("CLUMP", "PLAIN"):
+        guides.data.vellus.guide_colors = colors
+        bindings.invalidate(hair)
+        assert (sentence in note()) == (colors == "CLUMP")
+    guides.data.vellus.guide_colors = "CLUMP"
+    bpy.ops.vellus.guide_length(method="SCALE", factor=1.1)
+    bpy.context.view_layer.update()
+    assert bindings.of(hair) is not None and sentence not in note()
+
+
+def note():
+    """Return the text of the panel of hair systems."""
+    return " ".join(draw(bpy.types.VELLUS_PT_systems).texts)
+
+
+def size_of_hues(guides):
+    texture = guide_lines._hues_texture(guides.data)
+    return texture.width * texture.height
 
 
 def hues(picture):
