@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import unread_nodes
+from hair_addon.blender.data.pictures import shader_sockets, unread_nodes
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.render.frames.engine import NAME
 from tests.support.commands import run_here
@@ -102,6 +102,38 @@ def test_other_nodes_of_lights_are_named(lamp):
     assert sentence.endswith(f'as values: "{light.name}" (Noise Texture, Light Falloff).')
     bpy.context.object.hide_render = True
     assert told() == []
+
+
+def test_each_math_node_is_computed_once(lamp, monkeypatch):
+    """Math nodes that double one another are computed once each."""
+    light, emission = lamp
+    computed = []
+    add = shader_sockets._OPERATIONS["ADD"]
+    monkeypatch.setitem(shader_sockets._OPERATIONS, "ADD", lambda a, b: computed.append(a) or add(a, b))
+    node = link(light.node_tree, "ShaderNodeMath", emission.inputs["Strength"])
+    for _doubling in range(7):
+        before = link(light.node_tree, "ShaderNodeMath", node.inputs[0])
+        light.node_tree.links.new(before.outputs[0], node.inputs[1])
+        node = before
+    node.inputs[0].default_value = node.inputs[1].default_value = 0.5
+    assert shader_sockets.ShaderInput(emission.inputs["Strength"]).constant() == 128.0
+    assert len(computed) == 8
+
+
+def test_very_long_chains_and_very_large_numbers_are_not_read(lamp):
+    """Hundreds of Math nodes after one another, and a number that GPUs cannot store, are named."""
+    light, emission = lamp
+    first = node = link(light.node_tree, "ShaderNodeMath", emission.inputs["Strength"])
+    for _sum in range(600):
+        node = link(light.node_tree, "ShaderNodeMath", node.inputs[0])
+    (sentence,) = told()
+    assert sentence.endswith(f'as values: "{light.name}" (Math).')
+    light.node_tree.links.remove(first.inputs[0].links[0])
+    assert told() == []
+    first.operation, first.inputs[0].default_value, first.inputs[1].default_value = "MULTIPLY", 1e30, 1e30
+    (sentence,) = told()
+    assert sentence.endswith(f'as values: "{light.name}" (Math).')
+    assert np.isfinite(record()["power"]).all()
 
 
 def test_procedural_materials_are_named_and_images_are_not(painted):

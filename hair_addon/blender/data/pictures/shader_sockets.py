@@ -43,12 +43,18 @@ class ShaderInput:
         """Return the constant value of the socket, of the socket it is linked to, or of nodes that compute a constant:
         RGB, Value, Math, Blackbody and a quadratic Light Falloff; None for other nodes.
         """
+        return self._constant({}, 0)
+
+    def _constant(self, known, depth):
+        """Return as `constant`; known: {(`ShaderNode`, output): constant}, of nodes that several inputs read."""
         end, node, output = self._followed()
         own = self.socket.default_value
         if node is None or node.type in {"RGB", "VALUE"}:
             value = (end if node is None else output).default_value
         else:
-            value = _computed(node, output)
+            if (node, output) not in known:
+                known[node, output] = _computed(node, output, known, depth + 1)
+            value = known[node, output]
         if value is None:
             return None
         is_color = hasattr(own, "__len__")
@@ -113,23 +119,29 @@ _OPERATIONS = {
     "MAXIMUM": max,
 }
 
+_DEEPEST = 50  # nodes that read one another
+_LARGEST = 3e38  # of numbers on GPUs
 
-def _computed(found, output):
+
+def _computed(found, output, known, depth):
     """Return the constant value of an output of a `ShaderNode` that computes it from constants, or None."""
     node = found.node
+    if depth > _DEEPEST:
+        return None
     if node.type == "MATH" and node.operation in _OPERATIONS:
-        values = [ShaderInput(socket, found.groups).constant() for socket in node.inputs[:2]]
+        values = [ShaderInput(socket, found.groups)._constant(known, depth) for socket in node.inputs[:2]]
         if None in values:
             return None
         value = _OPERATIONS[node.operation](*values)
-        return min(max(value, 0.0), 1.0) if node.use_clamp else value
+        value = min(max(value, 0.0), 1.0) if node.use_clamp else value
+        return value if abs(value) < _LARGEST else None
     if node.type == "BLACKBODY":
-        temperature = found["Temperature"].constant()
+        temperature = found["Temperature"]._constant(known, depth)
         if temperature is None or not temperature >= blackbody.LEAST:
             return None
         return (*map(float, blackbody.blackbody_color(temperature)), 1.0)
-    if node.type == "LIGHT_FALLOFF" and output.name == "Quadratic" and found["Smooth"].constant() == 0.0:
-        return found["Strength"].constant()
+    if node.type == "LIGHT_FALLOFF" and output.name == "Quadratic" and found["Smooth"]._constant(known, depth) == 0.0:
+        return found["Strength"]._constant(known, depth)
     return None
 
 
