@@ -229,7 +229,9 @@ def test_arrays_are_in_meters_and_the_axes_of_the_file(scene, tmp_path, kind):
     assert (tips[1] - tips[0]).mean() < -0.02 * size
 
 
-@pytest.mark.parametrize(("ending", "scale_length"), pairs([".usda", ".usdc", ".usdz", ".abc"], [1.0, 0.01], 2))
+@pytest.mark.parametrize(
+    ("ending", "scale_length"), [*pairs([".usda", ".usdc", ".abc"], [1.0, 0.01], 2), (".usdz", 1.0)]
+)  # a .usdz file with another unit is refused
 def test_exchange_files_hold_the_same_points_in_meters(scene, tmp_path, ending, scale_length):
     build(scale_length)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
