@@ -5,6 +5,7 @@ Panels call these on every redraw, so geometry is not read.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import bpy
 from bpy.types import Curves, PropertyGroup
@@ -80,13 +81,16 @@ def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     bound = bindings.of(hair)
     if bound is None or bound.styles.styling is None:
         return
-    tree = program.tree_settings(style_items.settings_of(item))
+    styling, tree = bound.styles.styling, program.tree_settings(style_items.settings_of(item))
     if tree is None:
         return
-    factor = clump_trees.size_factor(bound.styles.styling.trees.area, tree)
+    # A map of the size gives a style several trees.
+    used = next((known for known, _level in styling.tree_levels if replace(known, variants=()) == tree), tree)
+    finest = min(used.variants or (tree,), key=lambda each: min(each.sizes))
+    factor = clump_trees.size_factor(styling.trees.area, finest)
     if factor > 1.0:
         units = bpy.context.scene.unit_settings.system
-        size = bpy.utils.units.to_string(units, "LENGTH", factor * tree.sizes[0], precision=3)
+        size = bpy.utils.units.to_string(units, "LENGTH", factor * finest.sizes[0], precision=3)
         yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
 
 

@@ -8,11 +8,13 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import bindings
+from hair_addon.blender.groom.styles import style_notes
 from hair_addon.blender.groom.transfer import groom_settings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
+from hair_addon.core.styling import clump_trees
 from tests.support.pictures import drawn_strands
 from tests.support.pictures.gpu_strands import drawn, window  # noqa: F401
 
@@ -227,3 +229,19 @@ def test_a_map_without_values_says_so(hair, setting, source):
     assert f'cannot vary "{setting}": pick another kind of map.' in hair.data.vellus.status
     api.set_map(hair.data, setting, "strand", low=0.2, high=0.5)
     assert not np.array_equal(points(hair.data), whole) and hair.data.vellus.status == ""
+
+
+def test_sizes_of_a_map_that_are_too_small_are_explained(hair, monkeypatch):
+    """If only the smallest locks of a map are too small for the surface, a note on the style names the size in use."""
+    monkeypatch.setattr(clump_trees, "MOST_SITES", 300)
+    api.add_style(hair.data, "CLUMP", size=0.5, levels=1)
+    name, _surface = half_group()
+    points(hair.data)
+    (item,) = hair.data.vellus.styles
+    assert style_notes.notes_of(hair.data, item) == []
+    api.set_map(hair.data, "styles.Clump.size", f"group:{name}", low=0.1, high=1.0)
+    points(hair.data)
+    size = (bindings.of(hair.data).styles.trees.area / (0.866 * 300)) ** 0.5
+    assert 0.05 < size < 0.5
+    text = f"The locks are too small for this surface: a size of {100.0 * size:.1f} cm is used."
+    assert style_notes.notes_of(hair.data, item) == [text]
