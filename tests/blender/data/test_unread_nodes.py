@@ -181,3 +181,17 @@ def test_a_panel_reads_nodes_again_only_after_a_change(painted, monkeypatch):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.render.engine = NAME
     assert shown() == [] and len(read) == 4
+
+
+def test_sentences_load_no_images(painted, tmp_path):
+    """Sentences about materials, which a panel shows, do not load files of images."""
+    material, shader = painted
+    path = str(tmp_path / "skin.png")
+    made = bpy.data.images.new("Skin", 4, 4)
+    made.filepath_raw, made.file_format = path, "PNG"
+    made.save()
+    image = bpy.data.images.load(path, check_existing=False)
+    link(material.node_tree, "ShaderNodeTexImage", shader.inputs["Base Color"]).image = image
+    normal = link(material.node_tree, "ShaderNodeNormalMap", shader.inputs["Normal"])
+    link(material.node_tree, "ShaderNodeTexImage", normal.inputs["Color"]).image = image
+    assert told() == [] and not image.has_data

@@ -135,7 +135,14 @@ class _Noted:
 
     def __getitem__(self, name):
         self.names.append(name)
-        return self._sockets[name]
+        return _WithoutNodes(self._sockets[name].socket, self._sockets[name].groups)
+
+
+class _WithoutNodes(ShaderInput):
+    """A `ShaderInput` without the nodes before it, so that files of images are not loaded."""
+
+    def source(self):
+        return None, None
 
 
 def inputs_read(sockets, material):
