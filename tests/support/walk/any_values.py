@@ -89,7 +89,7 @@ def value(declared, source, folder, odd=0.0):
     if declared.type == "COLLECTION":  # up to three items, as operators take them
         of_items = [item for item in declared.fixed_type.properties if item.identifier not in {"rna_type", "name"}]
         return [
-            {item.identifier: value(item, source, folder, odd) for item in of_items}
+            {"name": ""} | {item.identifier: value(item, source, folder, odd) for item in of_items}
             for _ in range(source.randint(0, 3))
         ]
     if declared.type == "STRING":
