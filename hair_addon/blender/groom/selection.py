@@ -88,7 +88,7 @@ def painted_hair(active: Object) -> Curves | None:
     if not any(painted):
         return None
     for masks_of in (_active_masks, _style_masks, _map_sources, _density_masks):
-        masked = [hair for hair in grown_on(active) if any(map(_are_alike, masks_of(hair), repeat(painted)))]
+        masked = [hair for hair in hair_grown_on(active) if any(map(_are_alike, masks_of(hair), repeat(painted)))]
         if masked:
             return _newest(masked)
     return None
@@ -143,7 +143,7 @@ def curves_on(surface: Object, kind: str) -> list[Curves]:
     return [guides for guides in found if has_object(guides) or followers_shown(guides)]
 
 
-def grown_on(surface: Object) -> list[Curves]:
+def hair_grown_on(surface: Object) -> list[Curves]:
     """Return all hair Curves that grow on a mesh object except deleted ones, even if only their guides are on it."""
     found = [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and curves.grown_on(c) == surface]
     return [hair for hair in found if is_shown(hair)]

@@ -20,7 +20,7 @@ _COLORS = ("FLOAT_COLOR", "BYTE_COLOR")
 
 def is_painting(active: Object | None) -> bool:
     """Whether an object is a surface with hair in one of Blender's paint modes."""
-    return active is not None and active.mode in PAINT_MODES and bool(selection.grown_on(active))
+    return active is not None and active.mode in PAINT_MODES and bool(selection.hair_grown_on(active))
 
 
 def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
@@ -70,7 +70,7 @@ def stop(surface: Object, context: Context) -> None:
     """Leave the paint mode of a surface, and select the hair whose mask was painted."""
     painted = selection.painted_hair(surface)
     bpy.ops.object.mode_set(mode="OBJECT")
-    present = reversed(selection.grown_on(surface))
+    present = reversed(selection.hair_grown_on(surface))
     wanted = present if painted is None else (painted, *present)
     shown = (selection.object_of(hair, context.view_layer) for hair in wanted)
     hair_object = next((o for o in shown if o is not None and o.visible_get(view_layer=context.view_layer)), None)
