@@ -21,6 +21,8 @@ import pytest
 from hair_addon.blender.ui import operators
 from tools import build_extension, compile_kernels, manual_pages
 
+pytestmark = pytest.mark.farm  # each test starts Blender or reads the extension that others start
+
 WALK = Path(__file__).with_name("support") / "walk" / "walk_installed.py"
 ROOT = build_extension.ROOT
 
@@ -109,12 +111,10 @@ def test_bare_python_has_neither_warp_nor_openexr(bare_python):
         assert "ModuleNotFoundError" in found.stderr
 
 
-@pytest.mark.farm
 def test_installs_and_enables(walk):
     assert walk.used["installed"] == {"result": ["FINISHED"], "enabled": True}
 
 
-@pytest.mark.farm
 def test_installed_operators_run(walk, used):
     made = used["operators"]
     assert made["results"] == [["FINISHED"]] * 5
@@ -134,7 +134,6 @@ def test_code_of_readme_and_docstrings_runs_in_the_extension(used):
     assert (ran["blocks"], ran["examples"] > 60) == (3, True)
 
 
-@pytest.mark.farm
 def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
     before, enabled, disabled, enabled_again, disabled_again = walk("twice")["states"]
     assert enabled["operators"] == sorted(operator.bl_idname.split(".")[1] for operator in operators.CLASSES)

@@ -149,6 +149,7 @@ def test_scripts_run_where_they_are_enabled():
         assert {one.enable_scripts for one in given} == {is_enabled} and len(given) == 5
 
 
+@pytest.mark.farm
 def test_the_add_on_of_blender_evaluates_the_pattern(tmp_path):
     """Blender's add-on evaluates the pattern as a setting that is not editable, by Python's eval with these names."""
     settings = {setting["key"]: setting for setting in submitted()["type"]["settings"]}
@@ -176,6 +177,7 @@ def made_by(job):
     return made
 
 
+@pytest.mark.farm
 def test_submitting_twice_makes_two_whole_jobs_and_requeue_goes_on(turning, tmp_path):  # noqa: F811
     blend = shutil.copy(turning, tmp_path / "ball.blend")
     settings = {"frames": "1-3", "chunk_size": 2, "blendfile": str(blend), "samples": 1}

@@ -73,6 +73,7 @@ def left_on(terminal):
     return terminal.rest().rpartition("\r\x1b[K")[2]
 
 
+@pytest.mark.farm
 def test_long_work_ends_at_its_next_step(tmp_path):
     """Ctrl-C ends long work at its next step, with exit status and one sentence on the terminal."""
     terminal, out = Terminal(), tmp_path / "new" / "out.npz"
@@ -87,6 +88,7 @@ def test_long_work_ends_at_its_next_step(tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
+@pytest.mark.farm
 def test_a_request_to_end_has_a_status_of_its_own(tmp_path):
     """SIGTERM ends work as Ctrl-C does, with status 143; the test runs the command in its own process."""
     terminal = Terminal()

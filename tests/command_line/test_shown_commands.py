@@ -13,6 +13,7 @@ from tests.support.commands import HEAD, ROOT, run_here
 PAGE = ROOT / "docs" / "command_line.md"
 
 
+@pytest.mark.farm
 def test_the_page_shows_commands_that_work(lit, tmp_path, monkeypatch):
     """The commands of the page run one after another, with smaller numbers, in a folder with the files that they
     name.

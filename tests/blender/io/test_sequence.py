@@ -149,6 +149,7 @@ def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
     assert frame_numbers(run_here(*words(turning, tmp_path))) == []
 
 
+@pytest.mark.farm
 def test_another_machine_goes_on(turning, whole, tmp_path):
     """Another machine continues a sequence under other paths of the file and of the frames, as only their contents
     count.
@@ -272,6 +273,7 @@ def spoil(folder, ending):
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
 
 
+@pytest.mark.farm
 @pytest.mark.parametrize("more", [("--out", "f_###.png"), ("--out", "f_###.exr", "--passes")])
 def test_unreadable_pictures_are_rendered_again(turning, tmp_path, monkeypatch, more):
     monkeypatch.chdir(tmp_path)

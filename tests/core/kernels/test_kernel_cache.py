@@ -130,6 +130,7 @@ print("without digest:", kernel_entries.is_whole(device, module))
 """
 
 
+@pytest.mark.farm
 def test_a_flipped_bit_is_noticed(cache, tmp_path):
     """No file with a flipped bit is loaded: its code could end the process or compute something else."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(tmp_path)}
@@ -151,6 +152,7 @@ def temporary(compiled, tmp_path):
     return folder
 
 
+@pytest.mark.farm
 def test_a_folder_that_cannot_be_made_is_left_for_a_temporary_one(temporary, tmp_path):
     (tmp_path / "file").write_text("")
     before = digest(temporary)
@@ -177,6 +179,7 @@ def test_a_disk_that_takes_no_kernel_is_left_for_a_temporary_folder(temporary, t
     assert work(tmp_path / "disk", temporary, before=before).is_relative_to(temporary)
 
 
+@pytest.mark.farm
 @needs_mounts
 def test_a_cache_that_may_only_be_read_is_read(cache, tmp_path):
     mounting = f'mount --bind {cache} {cache} && mount -o remount,bind,ro {cache} && exec "$@"'
@@ -199,6 +202,7 @@ def test_a_folder_that_others_may_write_is_not_trusted(tmp_path, monkeypatch):
     assert kernel_cache.temporary_folder() != own
 
 
+@pytest.mark.farm
 def test_without_any_folder_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     blocked = tmp_path / "file" / "cache"
