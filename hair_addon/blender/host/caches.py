@@ -14,7 +14,7 @@ class Cache:
     """
 
     def __init__(self, capacity=None):
-        self._values, self._capacity = {}, capacity
+        self._values, self._capacity, self._least = {}, capacity, capacity
 
     def __len__(self):
         return len(self._values)
@@ -33,6 +33,12 @@ class Cache:
         while self._capacity is not None and len(self._values) > self._capacity:
             del self._values[next(iter(self._values))]
         return value
+
+    def make_room(self, count):
+        """Keep `count` values of what is in use beside the capacity: values that are read in turn and do not all fit
+        would each be dropped before they are read again.
+        """
+        self._capacity = self._least + count
 
     def keeping(self, make):
         """Decorate a function: store its result for each set of arguments."""

@@ -380,6 +380,7 @@ def _upload(meshes, is_shaded, has_paths):
     is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
     """
     uploaded, blockers, twins = {False: [], True: []}, [], {}
+    surface_textures.surface_cache.make_room(len(meshes))
     for mesh in meshes:
         is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh, twins)
         if mesh.is_seen:

@@ -63,6 +63,17 @@ def test_what_was_used_longest_ago_gives_way():
     assert cache.values() == [4, 5]
 
 
+def test_values_in_use_have_room_until_fewer_are_in_use():
+    cache = Cache(capacity=1)
+    cache.make_room(3)
+    for key in "abcd":
+        cache.keep(key, key)
+    assert cache.values() == ["a", "b", "c", "d"]
+    cache.make_room(1)
+    cache.keep("e", "e")
+    assert cache.values() == ["d", "e"]
+
+
 def test_another_value_takes_the_place_of_the_one_before():
     cache = Cache()
     cache.keep("a", 1)

@@ -117,6 +117,8 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, needs_normals, override, has_uvs)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
             meshes.append(replace(mesh, owner=owner_of(instance), **rays))
+    for cache in (scene.faces_cache, layout_cache):
+        cache.make_room(len(meshes))
     return [mesh for mesh in meshes if len(mesh.triangles)]
 
 

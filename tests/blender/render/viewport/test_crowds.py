@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import ambient_visibility, shadows, strand_batches, surface_textures
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
@@ -77,6 +78,27 @@ def test_linked_heads_look_the_same_drawn_together_and_one_by_one(thin, monkeypa
         assert found[2] == one_by_one[2]
     assert together[0][..., 3].max() > 0.5 and together[1].max() > 0.5
     assert np.abs(shadowed[0] - together[0]).max() > 0.1
+
+
+def test_surfaces_of_a_crowd_are_uploaded_and_triangulated_once(thin, monkeypatch):
+    """Also those of more heads than the caches hold for one head."""
+    link(thin, PLACES)
+    for cache in (surface_textures.surface_cache, drawn_meshes.layout_cache):
+        monkeypatch.setattr(cache, "_least", 2)
+        monkeypatch.setattr(cache, "_capacity", 2)
+        cache.clear()
+
+    def textures():
+        return [surface.places for surface, _parts in read().surfaces]
+
+    def triangles():
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return [mesh.triangles for mesh in drawn_meshes.read_drawn_meshes(depsgraph, is_moving=True)]
+
+    triangles()  # learns the number of heads
+    for read_all in (textures, triangles):
+        before, after = read_all(), read_all()
+        assert len(before) == len(PLACES) and all(one is other for one, other in zip(before, after, strict=True))
 
 
 def test_one_head_alone_is_drawn_by_itself(thin):
