@@ -5,7 +5,7 @@ After an event nothing is drawn or computed from values that were cached before 
 """
 
 from ..data.maps import image_pixels
-from ..data.pictures import root_colors, unread_nodes
+from ..data.pictures import root_colors, surface_means, unread_nodes
 from ..gpu import world_texture
 from ..groom.guides import guide_states, outside_guides
 from ..render import hair_cache, modified_hair
@@ -54,5 +54,6 @@ def image_changed():
     Each render checks by itself.
     """
     image_pixels.pixel_cache.clear()
+    surface_means.picture_cache.clear()
     world_texture.check_image()
     root_colors.sample_cache.clear()

@@ -6,7 +6,7 @@
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.maps import image_pixels, sources
-from ..data.pictures import drawn_meshes, root_colors, unread_nodes, world_panoramas
+from ..data.pictures import drawn_meshes, root_colors, surface_means, unread_nodes, world_panoramas
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
@@ -75,6 +75,8 @@ OTHERS = (
     sources.texel_cache,
     image_pixels.converted_cache,
     drawn_meshes.layout_cache,
+    surface_means.picture_cache,
+    surface_means.mean_cache,
     edited_faces.left_cache,
     frame_faces.count_cache,
     subdivided_surfaces.smooth_cache,

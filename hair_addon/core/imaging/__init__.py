@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         panorama,
         picture_checks,
         pixel_sampling,
+        texture_means,
         thin_lens,
     )
 else:

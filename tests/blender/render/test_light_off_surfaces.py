@@ -155,6 +155,34 @@ def test_light_off_a_surface_has_the_color_that_is_there(scene, source):
     np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
 
 
+@pytest.mark.parametrize("source", ["sun", "world"])
+def test_an_image_reflects_its_mean_color(scene, source):
+    """A plane with a fine checkered image reflects to strands the mean of its colors, also in a view that has changed
+    its image.
+    """
+    tangent, towards = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8)
+    set_light(scene, source)
+    look(scene, towards)
+    curves = strands_over_a_plane(scene, tangent, (0.0, 0.0, 0.0))
+    without = mean_color()
+    material = bpy.data.materials.new("Checkered")
+    curves.surface.data.materials[0] = material
+    tree, image = material.node_tree, bpy.data.images.new("Checkers", 32, 32, float_buffer=True)
+    shader = tree.nodes["Principled BSDF"]
+    shader.inputs["Specular IOR Level"].default_value, shader.inputs["Roughness"].default_value = 0.0, 1.0
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    checkers = np.indices((32, 32)).sum(axis=0) % 2
+    for color in (np.array([0.8, 0.4, 0.2]), np.array([0.2, 0.8, 0.4])):
+        pixels = np.ones((32, 32, 4), np.float32)
+        pixels[..., :3] = checkers[..., None] * color
+        image.pixels.foreach_set(pixels.ravel())
+        image.update()
+        expected = 0.5 * color * received(source) * light_from_below(tangent, towards)
+        np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
+
+
 def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0

@@ -112,7 +112,7 @@ def _pixels_of(image, named, is_color, is_painted=False):
     if not (width and height and image.channels):
         raise _without_pixels(named)
     convert = pixels.colors if is_color else pixels.masks
-    raw, way = _raw(image), _way_of(image)
+    raw, way = _raw(image), conversion_of(image)
     if not is_painted or max(raw.shape[:2]) > pixels.MOST_SIDE:
         return convert(raw, **way)
     key = image.session_uid, is_color
@@ -127,7 +127,7 @@ def _pixels_of(image, named, is_color, is_painted=False):
     return converted_cache.keep(key, _Converted(raw, way, found)).pixels
 
 
-def _way_of(image):
+def conversion_of(image):
     """Return the arguments of `pixels.colors` for an image."""
     return {
         # Blender converts floating-point images while it loads them.

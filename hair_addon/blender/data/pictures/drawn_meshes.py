@@ -10,7 +10,7 @@ from ....core.geometry.mesh import Faces
 from ...host.caches import Cache
 from ...host.notices import can_be_drawn, name_of
 from .. import scene
-from . import surface_materials
+from . import surface_materials, surface_means
 from .rendered_instances import is_rendered, placed_by
 
 
@@ -53,17 +53,40 @@ class DrawnMesh:
 
     @property
     def colors(self):
-        """(number of corners, linear RGB) of each material, in the corners' order."""
-        return tuple((count, material.color) for count, material in self.materials)
+        """(number of corners, linear RGB) of each material, in the corners' order; of images their mean over it."""
+        parts = zip(self.materials, self._image_means, strict=True)
+        return tuple((count, material.color if means is None else means.of_part) for (count, material), means in parts)
 
     @property
     def triangle_materials(self):
-        """(F, 6) float32 of each triangle's material: linear RGB, roughness, metallic, reflectance."""
+        """(F, 6) float32 of each triangle's material: linear RGB, roughness, metallic, reflectance; of images their
+        mean over the triangle.
+        """
         rows = [
             (*material.color, material.roughness, material.metallic, material.reflectance)
             for _count, material in self.materials
         ]
-        return np.array(rows, np.float32).repeat([count // 3 for count, _material in self.materials], axis=0)
+        found = np.array(rows, np.float32).repeat([count // 3 for count, _material in self.materials], axis=0)
+        first = 0
+        for (count, _material), means in zip(self.materials, self._image_means, strict=True):
+            if means is not None:
+                found[first : first + count // 3, :3] = means.of_triangles
+            first += count // 3
+        return found
+
+    @cached_property
+    def _image_means(self):
+        """`surface_means.ImageMeans` of each material, None without an image of its color."""
+        first, found = 0, []
+        for count, material in self.materials:
+            corners = slice(first, first + count)
+            means = None
+            if material.color_image is not None and count:
+                uvs = np.zeros((count, 2), np.float32) if self.uvs is None else self.uvs[corners]
+                means = surface_means.of_image(material.color_image, uvs)
+            found.append(means)
+            first += count
+        return found
 
     @property
     def is_clear(self):
@@ -194,7 +217,7 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, 
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
         parts = _parts(mesh_object, layout.runs, override)
-        uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts, has_uvs)
+        uvs = _read_uvs(mesh, layout.loops, parts, has_uvs)
     finally:
         mesh_object.to_mesh_clear()
     materials = tuple((count, material) for _first, count, material in parts)
