@@ -37,6 +37,7 @@ class Param:
     typical: float | None = None  # typical value of a setting that is computed from the surface unless given
     diameter: tuple[str, str] | None = None  # for a radius: property that shows the diameter in mm, its description
     may_vary: bool = False  # whether a map may give each strand a value of its own
+    has_course: bool = False  # whether a curve may change the value from root to tip
     is_structural: bool = False  # changes the grouping of strands: not animatable, because strands would jump
 
 

@@ -26,6 +26,18 @@ float varied_number_at(int place)
   return known_number(KNOWN_LEVELS + styling.level_count + row);
 }
 
+// The row of a course of the step, by its place in `COURSES`; -1: none. Values of a row.
+int course_row(int slot)
+{
+  return ((row_now.courses >> (slot * COURSE_BITS)) & ((1 << COURSE_BITS) - 1)) - 1;
+}
+
+float course_sample(int row, int at)
+{
+  int place = row * COURSE_SAMPLES + at;
+  return styling.courses[place / 4][place % 4];
+}
+
 #include "all.strand"
 
 int whole(float high, float low)

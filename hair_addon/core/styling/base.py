@@ -3,12 +3,13 @@
 
 The amount of a style at point i of strand s, with x_i the fraction of the strand's length from its root:
 
-    A_si = amount · mask_s · (1 - vary · h_s) · profile(x_i)
+    A_si = amount · mask_s · (1 - vary · h_s) · profile(x_i) · course(x_i)
     profile(x) = root + (tip - root) · g(clamp((x - start) / (1 - start), 0, 1))
 
 h_s is a random number of the strand (random_numbers.py) and g the curve of Blender's hair nodes with their Shape σ:
 x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment after the start, a
 straight line replaces x^e: x^e starts vertically, so points would jump when the start passes them.
+The course is 1, or a curve from root to tip (courses.py).
 """
 
 import math
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..params import Settings, param
+from ..params import Settings, param, param_of
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class StyleSettings(Settings):
 class ProfiledSettings(StyleSettings):
     """A style whose amount changes from root to tip."""
 
+    amount: float = param_of(StyleSettings, "amount", has_course=True)
     root: float = param(
         0.0,
         "Part of the amount at the roots",

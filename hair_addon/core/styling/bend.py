@@ -17,6 +17,7 @@ LABEL = "Bend"
 DESCRIPTION = "Bend strands, or roll up their tips"
 STEP = "BEND"
 NUMBERS = ("angle", "direction", "random_turn")  # of bend.strand: both angles in turns
+COURSES = ("amount", "angle")
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Settings(ProfiledSettings):
         unit="ROTATION",
         subtype="ANGLE",
         may_vary=True,
+        has_course=True,
     )
     turn: float = param(
         0.0,

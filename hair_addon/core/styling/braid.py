@@ -24,6 +24,7 @@ STEP = "WEAVE"
 SHARED_BY_LOCKS = True
 NEEDS_CENTRE = True
 NUMBERS = ("radius", "pitch", "flat_part", "tress_count", "thickness")  # of weave.strand
+COURSES = ("amount", "radius", "thickness")
 
 PATTERNS = (
     ("BRAID", "Braid", "Three tresses, each over the next in turn"),
@@ -57,6 +58,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         may_vary=True,
+        has_course=True,
     )
     pitch: float = param(
         0.04,
@@ -77,6 +79,7 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
         may_vary=True,
+        has_course=True,
     )
     start: float = param_of(ProfiledSettings, "start", 0.1)
     shape: float = param_of(ProfiledSettings, "shape", 0.1)

@@ -29,6 +29,7 @@ STEP = "CLUMP"
 SHARED_BY_LOCKS = True
 NEEDS_CENTRE = True
 NUMBERS = ("thickness", "twist", "stray")  # of clump.strand
+COURSES = ("amount", "thickness", "twist")
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,11 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
         may_vary=True,
+        has_course=True,
     )
-    twist: float = param(0.0, "Turns of a lock about its center from root to tip", low=-10.0, high=10.0, may_vary=True)
+    twist: float = param(
+        0.0, "Turns of a lock about its center from root to tip", low=-10.0, high=10.0, may_vary=True, has_course=True
+    )
     crossover: float = param(
         0.05,
         "Part of the strands that belongs to the second nearest lock",

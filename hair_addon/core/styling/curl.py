@@ -40,6 +40,7 @@ NUMBERS = (
     "left_handed",
     "switchback",
 )  # of curl.strand
+COURSES = ("amount", "radius", "pitch", "flatness")
 
 POINTS_A_TURN = 8  # with fewer, coils look angular
 
@@ -58,6 +59,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         may_vary=True,
+        has_course=True,
     )
     pitch: float = param(
         0.03,
@@ -69,6 +71,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         may_vary=True,
+        has_course=True,
     )
     pitch_vary: float = param(
         0.0,
@@ -86,6 +89,7 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
         may_vary=True,
+        has_course=True,
     )
     coherence: float = param(
         0.85,

@@ -35,6 +35,7 @@ NUMBERS = (
     "stray_gain",
     f"frequencies[{WAVES_AN_OCTAVE}]",
 )
+COURSES = ("amount", "amplitude", "wavelength")
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         may_vary=True,
+        has_course=True,
     )
     wavelength: float = param(
         0.03,
@@ -62,6 +64,7 @@ class Settings(ProfiledSettings):
         subtype="DISTANCE",
         precision=4,
         may_vary=True,
+        has_course=True,
     )
     octaves: int = param(
         2, "Number of octaves of noise; each has half the wavelength of the previous octave", low=1, high=MOST_OCTAVES

@@ -17,7 +17,7 @@ from .. import geometry, styling
 from ..geometry.mesh import SurfacePoints, TriMesh, normals
 from ..geometry.strands import Strands, from_numpy
 from ..geometry.strands import segment_lengths as lengths_of
-from . import base, kinds, lean, wet
+from . import base, courses, kinds, lean, wet
 from .base import Profile, StyleSettings, has_effect
 from .random_numbers import VARY, random_numbers
 from .varied_numbers import NumberMap
@@ -31,7 +31,8 @@ class Lean:
     """One style on guides.
 
     settings: of the style; amounts (G,): of each guide; profiles: one `Profile` for all guides, or one for each; None
-    for the course of wet hair; directions (G, 3): unit; clearances (G,) [m].
+    for the course of wet hair; directions (G, 3): unit; clearances (G,) [m]; curve (N,): the course of the amount, None
+    for 1.
     """
 
     settings: StyleSettings
@@ -39,6 +40,7 @@ class Lean:
     profiles: Sequence[Profile] | None
     directions: np.ndarray
     clearances: np.ndarray
+    curve: np.ndarray | None = None
 
     def is_same(self, other: "Lean") -> bool:
         """Return whether both styles lean guides equally."""
@@ -47,11 +49,16 @@ class Lean:
             (self.amounts, other.amounts),
             (self.directions, other.directions),
             (self.clearances, other.clearances),
+            (self.curve, other.curve),
         )
         return is_same and all(np.array_equal(*pair) for pair in arrays)
 
     def course(self, chosen: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Return the part (M, P) of the amount of guides with indices chosen (M,) at x (M, P), as for `evaluated`."""
+        found = self._profile(chosen, x)
+        return found if self.curve is None else found * courses.at(self.curve, x)
+
+    def _profile(self, chosen, x):
         if self.profiles is None:
             return np.clip(x / _WET_ROOT, 0.0, 1.0)
         if len(self.profiles) == 1:
@@ -69,12 +76,13 @@ def leans(
     targets: dict[str, np.ndarray],
     mask_key: Callable[[StyleSettings], Any],
     numbers: Mapping[tuple[int, str], NumberMap] = MappingProxyType({}),
+    curves: courses.Courses = MappingProxyType({}),
 ) -> list[Lean]:
     """Return the `Lean` of each style that acts on guides, in order.
 
     roots: of the guides; identities: (G,) int32 IDs; masks: (G,) weights by their keys; targets: unit (3,) directions
     by objects' names; numbers: maps of numbers that differ between guides, by (index of the style, name of the
-    setting).
+    setting); curves: courses of amounts, by the same keys.
     """
     found = []
     for place, declared in enumerate(styles):
@@ -93,7 +101,8 @@ def leans(
         directions = _directions(settings, mesh, roots, targets)
         if directions is not None:
             clearances = _of_all(settings.clearance, len(roots))
-            found.append(Lean(declared, amounts, _profiles(settings, len(roots)), directions, clearances))
+            profiles, curve = _profiles(settings, len(roots)), curves.get((place, "amount"))
+            found.append(Lean(declared, amounts, profiles, directions, clearances, curve))
     return found
 
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from . import clump, kinds, style_text, trim, wet
+from . import clump, courses, kinds, style_text, trim, wet
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
 # -1; the first of the centers that members count from; a bit for each number that differs between strands; the first of
-# the rows after the masks that contain these numbers.
-CHOICES = ("kind", "seed", "mask", "level", "first_centre", "varied", "first_varied")
+# the rows after the masks that contain these numbers; the rows of its courses, from `courses.Table.packed`.
+CHOICES = ("kind", "seed", "mask", "level", "first_centre", "varied", "first_varied", "courses")
 # The numbers that all steps have, which precede their own numbers, and the total count.
 SHARED = ("amount", "vary", "at_root", "at_tip", "exponent", "is_flipped", "from", "keep_length")
 NUMBERS = 24
@@ -27,10 +27,14 @@ CUT_KEY = ("", "", True)
 
 @dataclass(frozen=True)
 class Program:
-    """Steps as read by kernels: (N, 7) int32 `CHOICES` and (N, NUMBERS) float32, which do not change."""
+    """Steps as read by kernels: (N, 8) int32 `CHOICES` and (N, NUMBERS) float32, which do not change.
+
+    courses: (C, courses.SAMPLES) float32.
+    """
 
     choices: np.ndarray
     numbers: np.ndarray
+    courses: np.ndarray
     copies: dict[str, list[Any]] = field(init=False, default_factory=dict, compare=False)  # Warp arrays by device
 
     def __len__(self) -> int:
@@ -38,7 +42,7 @@ class Program:
 
     def before(self, step: int) -> "Program":
         """Return the steps before a step."""
-        return Program(self.choices[:step], self.numbers[:step])
+        return Program(self.choices[:step], self.numbers[:step], self.courses)
 
 
 def tree_settings(settings: StyleSettings) -> TreeSettings | None:
@@ -97,16 +101,19 @@ def compiled(
     masks: Sequence[tuple[str, str, bool]],
     first_centres: Sequence[int],
     varied: Sequence[Sequence[int]] = (),
+    curves: courses.Courses = MappingProxyType({}),
 ) -> Program:
     """Return the `Program` of steps.
 
     masks: from `mask_keys`; first_centres: offset of the centers of each level, the guides' own last; varied: for each
-    step the places of its numbers that differ between strands, from `varied_numbers.places_of`; none if it is empty.
+    step the places of its numbers that differ between strands, from `varied_numbers.places_of`; none if it is empty;
+    curves: courses of numbers. Raises `HairError` for too many courses.
     """
     choices = np.zeros((len(steps_made), len(CHOICES)), np.int32)
     numbers = np.zeros((len(steps_made), NUMBERS), np.float32)
     guides_level = len(first_centres) - 1
     first_varied = len(masks)
+    table = courses.Table()
     for row, step in enumerate(steps_made):
         key = mask_key(step.settings)
         level = guides_level if step.level is None else step.level
@@ -114,11 +121,12 @@ def compiled(
         places = varied[row] if varied else ()
         bits = sum(1 << place for place in places)
         head = kinds.STEP_KINDS[step.kind], step.settings.seed, mask, level, first_centres[level]
-        choices[row] = *head, bits, first_varied
+        packed = table.packed(curves, step.place, courses.names_of(kinds.STEPS[step.kind]))
+        choices[row] = *head, bits, first_varied, packed
         first_varied += len(places)
         row_numbers = numbers_of(step)
         numbers[row, : len(row_numbers)] = row_numbers
-    return Program(choices, numbers)
+    return Program(choices, numbers, table.rows())
 
 
 def numbers_of(step: Step) -> list[Any]:

@@ -14,6 +14,7 @@ LABEL = "Smooth"
 DESCRIPTION = "Smooth or straighten strands"
 STEP = "SMOOTH"
 NUMBERS = ("chord",)  # of smooth.strand: the length that is averaged [m]
+COURSES = ("amount",)
 
 
 @dataclass(frozen=True)

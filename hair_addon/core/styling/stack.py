@@ -238,7 +238,7 @@ def bind(
     first_centres = [0, *np.cumsum(counts).tolist()]
     made = programs.strand_steps(styles, inputs.cutters)
     numbers = varied_numbers.places_of(made, inputs.numbers)
-    program = programs.compiled(made, keys, first_centres, numbers)
+    program = programs.compiled(made, keys, first_centres, numbers, inputs.courses)
     guide_identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
     centre_normals = [side * bound.normals.numpy() for bound in bindings]
@@ -296,6 +296,7 @@ def bind(
         dict(inputs.targets),
         mask_key,
         inputs.numbers,
+        inputs.courses,
     )
     return Styling(
         tuple(styles),

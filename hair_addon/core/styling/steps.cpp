@@ -17,6 +17,7 @@
 //   array_t<int> centre_identities      (K,)
 //   array_t<int> choices                (N, CHOICES) of steps.py
 //   array_t<float> numbers              (N, NUMBERS) of steps.py
+//   array_t<float> courses              (C, COURSE_SAMPLES) of courses.py
 //   mat44 axes                          from the coordinates of points to the surface's own, without scale
 //
 // Constants: WIDTH, MOST points per strand, CHOICES, NUMBERS, and those of style_text.py.
@@ -102,7 +103,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const int* choice = choices.data + size_t(step) * CHOICES;
   const float* number = numbers.data + size_t(step) * NUMBERS;
   const int kind = choice[0], seed = choice[1], mask = choice[2], level = choice[3], first_centre = choice[4];
-  const int varied = choice[5], first_varied = choice[6];
+  const int varied = choice[5], first_varied = choice[6], packed_courses = choice[7];
   // A number that may differ between strands: a row of `masks` for each bit of `varied`, from `first_varied` on.
   const auto varied_number_at = [&](int place) ALWAYS_INLINE {
     lanes found = number[place];

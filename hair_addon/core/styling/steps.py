@@ -14,7 +14,7 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count, require_indices
-from . import kinds, style_text
+from . import courses, kinds, style_text
 from .program import CHOICES, NUMBERS, Program
 
 # No gradients are needed. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
@@ -87,6 +87,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         centre_identities: wp.array[int],
         choices: wp.array2d[int],
         numbers: wp.array2d[float],
+        courses: wp.array2d[float],
         axes: wp.mat44,
     ): ...
 
@@ -104,6 +105,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         centre_identities: wp.array[int],
         choices: wp.array2d[int],
         numbers: wp.array2d[float],
+        courses: wp.array2d[float],
         axes: wp.mat44,
         first: int,
     ):
@@ -120,6 +122,7 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
             centre_identities,
             choices,
             numbers,
+            courses,
             axes,
         )
 
@@ -175,7 +178,8 @@ def _copied(program, device):
     """Return the arrays of a program on a device, copied once, because a stroke launches it repeatedly."""
     if device.alias not in program.copies:
         choices = wp.array(program.choices, dtype=int, device=device)
-        program.copies[device.alias] = [choices, wp.array(program.numbers, dtype=float, device=device)]
+        tables = [wp.array(rows, dtype=float, device=device) for rows in (program.numbers, program.courses)]
+        program.copies[device.alias] = [choices, *tables]
     return program.copies[device.alias]
 
 
@@ -193,7 +197,11 @@ def _check(points, program, data, chosen, most_points):
     require_count("choices of a step", program.choices.shape[1], len(CHOICES))
     require_count("numbers of a step", program.numbers.shape[1], NUMBERS)
     require_count("steps", len(program.numbers), len(program))
-    step_kinds, _seeds, masks, levels, first_centres, varied, first_varied = program.choices.T
+    require_count("samples of a course", program.courses.shape[1], courses.SAMPLES)
+    step_kinds, _seeds, masks, levels, first_centres, varied, first_varied, packed = program.choices.T
+    for slot in range(courses.MOST_OF_A_STEP):
+        rows = ((packed >> (courses.BITS * slot)) & ((1 << courses.BITS) - 1)) - 1
+        require_indices("courses", rows[rows >= 0], len(program.courses))
     has_varied = varied != 0
     require_indices("first numbers of strands", first_varied[has_varied], len(data.masks))
     ends = first_varied + np.bitwise_count(varied)

@@ -22,6 +22,16 @@ const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) ALWAYS
   sine_and_cosine_of(turns, sine, cosine);
 #endif
 };
+// The row of a course of the step, by its place in `COURSES`; -1: none. Values of a row.
+const auto course_row = [&](int slot) {
+  return ((packed_courses >> (slot * COURSE_BITS)) & ((1 << COURSE_BITS) - 1)) - 1;
+};
+const auto course_sample = [&](int row, const ints& at) {
+  const float* const samples = courses.data + size_t(row) * COURSE_SAMPLES;
+  lanes found;
+  for (int lane = 0; lane < LANES; ++lane) set_lane(found, lane, samples[get_lane(at, lane)]);
+  return found;
+};
 const auto int_of = [](float value) { return static_cast<int>(value); };
 const auto float_of = [](int value) { return static_cast<float>(value); };
 const auto root_of = [](float value) { return sqrtf(value); };

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .base import Cutter
+from .courses import Courses
 from .masks import CutMask, Mask
 from .varied_numbers import NumberMap
 
@@ -15,10 +16,12 @@ from .varied_numbers import NumberMap
 class Inputs:
     """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects.
 
-    numbers: values that differ between strands, by (index of the style, name of its setting).
+    numbers: values that differ between strands, by (index of the style, name of its setting);
+    courses: curves from root to tip of numbers, by the same keys.
     """
 
     masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
     cutters: Mapping[str, Cutter] = field(default_factory=dict)
     targets: Mapping[str, np.ndarray] = field(default_factory=dict)
     numbers: Mapping[tuple[int, str], NumberMap] = field(default_factory=dict)
+    courses: Courses = field(default_factory=dict)

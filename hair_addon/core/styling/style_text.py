@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Constants and generated texts with which .strand files are compiled in C++, CUDA and GLSL.
 
-`#include "bend.numbers"` declares the numbers of a step by their names in `NUMBERS` of its module, and `#include
-"all.strand"` includes the file of each kind of step and chooses among them.
+`#include "bend.numbers"` declares the numbers of a step by their names in `NUMBERS` of its module, and their courses;
+`#include "all.strand"` includes the file of each kind of step and chooses among them.
 """
 
 import re
 from collections.abc import Iterable
 
-from . import frizz, kinds, program
+from . import courses, frizz, kinds, program
 from .base import Step
 from .random_numbers import PURPOSES
 
@@ -25,6 +25,8 @@ def constants() -> dict[str, int]:
         **kinds.STEP_KINDS,
         **{f"{name.upper()}_NUMBER": place for place, name in enumerate(program.SHARED)},
         **PURPOSES,
+        "COURSE_SAMPLES": courses.SAMPLES,
+        "COURSE_BITS": courses.BITS,
         "WAVES": frizz.WAVES_AN_OCTAVE,
         "MOST_OCTAVES": frizz.MOST_OCTAVES,
         "NEEDING_CENTRE": bits("NEEDS_CENTRE"),  # a bit for each kind
@@ -65,4 +67,7 @@ def _declarations(step):
             lines.append(f"float {name};")
             lines += [f"{array[1]}[{k}] = number_at({place + k});" for k in range(int(array[2]))]
         place += int(array[2]) if array else 1
+    # The course of the amount is part of the profile.
+    names = courses.names_of(kinds.STEPS[step])
+    lines += [f"int {name}_course = course_row({slot});" for slot, name in enumerate(names) if slot > 0]
     return "\n".join(lines) + "\n"

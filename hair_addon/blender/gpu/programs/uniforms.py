@@ -192,6 +192,7 @@ MAKING = Block(
 )
 
 MOST_STEPS = 64  # maximum number of steps that the GPU applies to one hair
+MOST_COURSES = 16  # maximum number of courses of their numbers
 
 STEP = Block(
     "Step",
@@ -203,6 +204,7 @@ STEP = Block(
         "first_centre": "int",
         "varied": "int",  # a bit for each number that differs between strands
         "first_varied": "int",  # the mask that contains the first of these numbers
+        "courses": "int",  # rows of its courses, packed: core/styling/courses.py
         "numbers": ("vec4", 6),  # NUMBERS of core/styling/program.py, four by four
     },
 )
@@ -227,6 +229,7 @@ STYLING = Block(
         "step_count": "int",
         "hand": "float",  # -1 if `axes` are mirrored, else 1
         "steps": (STEP, MOST_STEPS),
+        "courses": ("vec4", MOST_COURSES * 16),  # 64 samples of each, four by four
     },
 )
 

@@ -36,7 +36,9 @@ _GROUP_SIZE = 64
 
 def can_style(styling: "Styling") -> bool:
     """Whether the GPU can apply these styles; Warp applies other stacks."""
-    return len(styling.program) <= uniforms.MOST_STEPS and 2 <= styling.point_count <= MOST_POINTS
+    program = styling.program
+    is_short = len(program) <= uniforms.MOST_STEPS and len(program.courses) <= uniforms.MOST_COURSES
+    return is_short and 2 <= styling.point_count <= MOST_POINTS
 
 
 @dataclass
@@ -243,6 +245,7 @@ def _put_steps(record, program):
         rows[name] = program.choices[:, column]
     rows["numbers"] = program.numbers.reshape(len(program), NUMBERS // 4, 4)
     record["step_count"] = len(program)
+    record["courses"][: program.courses.size // 4] = program.courses.reshape(-1, 4)
 
 
 def _kinds_of(program):

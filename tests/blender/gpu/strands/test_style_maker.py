@@ -13,6 +13,7 @@ from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
 from hair_addon.core.styling.base import Cutter
+from hair_addon.core.styling.courses import settings_with_course
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
 from hair_addon.core.styling.varied_numbers import NumberMap
@@ -141,6 +142,15 @@ def test_numbers_that_differ_between_strands_are_those_of_warp(hair, rng, one_pr
     assert np.abs(wanted - hair.styled(*above, style)).max() > 0.001
 
 
+def test_curves_from_root_to_tip(hair, rng, one_program):
+    """Courses of numbers on the GPU are those of Warp, in each kind of step that has courses."""
+    styles = (clump.Settings(size=0.04, twist=1.0), curl.Settings(), frizz.Settings(), bend.Settings())
+    course = np.array([1.0, 0.3, 0.8])
+    curves = {(place, name): course for place, style in enumerate(styles) for name in settings_with_course(style)}
+    wanted = assert_same(hair, rng, styles, inputs=Inputs(courses=curves))[2]
+    assert np.abs(wanted - hair.styled(*styles)).max() > 0.001
+
+
 @pytest.mark.parametrize("name", STACKS)
 def test_strands_are_those_of_warp(hair, rng, one_program, name):
     normal = np.array([0.6, 0.0, -0.8])
@@ -237,3 +247,6 @@ def test_some_stacks_are_left_to_warp(hair, monkeypatch):
     assert not style_maker.can_style(hair.bound(curl.Settings(), point_count=style_maker.MOST_POINTS + 1))
     assert style_maker.can_style(hair.bound(curl.Settings(), frizz.Settings()))
     assert not style_maker.can_style(hair.bound(*[bend.Settings()] * (uniforms.MOST_STEPS + 1)))
+    curves = {(place, "angle"): np.full(2, 0.01 * place) for place in range(uniforms.MOST_COURSES + 1)}
+    styles = [bend.Settings()] * len(curves)
+    assert not style_maker.can_style(hair.bound(*styles, inputs=Inputs(courses=curves)))

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Courses of numbers of styles: curves from root to tip by which a number is multiplied, such as the radius of curls.
+
+A course is `SAMPLES` values at even fractions of a strand's length, with lines between. Each kind of step lists the
+settings that may have a course in `COURSES`, the amount first; its text asks for them by their places in this list.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import HairError
+from ..params import declared
+from .base import StyleSettings
+
+SAMPLES = 64
+MOST_OF_A_STEP = 4  # courses that a step may have
+BITS = 7  # of the packed number of each course
+LEAST = 0.1  # smallest factor of a length of waves or turns, which must be positive
+
+# Samples (N,) by (index of the style, name of its setting).
+Courses = Mapping[tuple[int, str], np.ndarray]
+
+
+def settings_with_course(settings: StyleSettings | type[StyleSettings]) -> tuple[str, ...]:
+    """Return the names of the settings of a style that may have a course, as declared."""
+    settings_class = settings if isinstance(settings, type) else type(settings)
+    return tuple(name for name, _default, details in declared(settings_class) if details.has_course)
+
+
+def sampled(course: np.ndarray) -> np.ndarray:
+    """Return (`SAMPLES`,) float32 of a course (N,) with even samples from root to tip."""
+    return at(course, np.linspace(0.0, 1.0, SAMPLES)).astype(np.float32)
+
+
+def at(course: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return the values of a course (N,) at fractions x of the length, in the shape of x."""
+    return np.interp(x, np.linspace(0.0, 1.0, len(course)), course)
+
+
+class Table:
+    """The distinct courses of a program, in rows."""
+
+    def __init__(self) -> None:
+        self._rows: dict[bytes, int] = {}
+
+    def packed(self, courses: Courses, place: int, names: tuple[str, ...]) -> int:
+        """Return the rows of the courses of a step, from one, in `BITS` bits each; 0 in place of absent courses.
+
+        place: index of the step's style; names: of the settings that may have a course. Raises `HairError`.
+        """
+        found = 0
+        for slot, name in enumerate(names):
+            course = courses.get((place, name))
+            if course is not None:
+                row = self._rows.setdefault(sampled(course).tobytes(), len(self._rows))
+                found |= (row + 1) << (BITS * slot)
+        if len(self._rows) >= 1 << BITS:
+            raise HairError("The styles of a hair may have at most {most} curves.", most=(1 << BITS) - 1)
+        return found
+
+    def rows(self) -> np.ndarray:
+        """Return (C, `SAMPLES`) float32."""
+        return np.frombuffer(b"".join(self._rows), np.float32).reshape(-1, SAMPLES)
+
+
+def names_of(module: Any) -> tuple[str, ...]:
+    """Return the settings of a kind of step that may have a course, in the order of its text; module: of the step."""
+    return getattr(module, "COURSES", ())
