@@ -65,7 +65,7 @@ from .imports import (
     use_as_hair,
 )
 from .library import apply_groom, groom_names, save_groom
-from .maps import MapSettings, clear_map, maps_of, set_map, set_thickness_curve, thickness_curve_of
+from .maps import MapSettings, clear_map, maps_of, set_course, set_map, set_thickness_curve, thickness_curve_of
 from .pictures import draw, render
 from .styles import add_style, apply_style_preset, set_styles, styles_of
 from .systems import delete_hair, hair_systems, look_names, style_preset_names
@@ -120,6 +120,7 @@ __all__ = [
     "render",
     "save_groom",
     "save_settings",
+    "set_course",
     "set_dynamics",
     "set_layer",
     "set_map",

@@ -4,7 +4,7 @@
 from typing import Any
 
 from ..core.errors import HairError
-from ..core.maps import varied_settings
+from ..core.maps import ramp_text, varied_settings
 from ..core.maps.map_settings import MapSettings
 from ..core.params import described
 from .arguments import changed
@@ -13,7 +13,7 @@ from .blender_access import blender
 Curves = Any
 Image = Any
 
-__all__ = ["MapSettings", "clear_map", "maps_of", "set_map", "set_thickness_curve", "thickness_curve_of"]
+__all__ = ["MapSettings", "clear_map", "maps_of", "set_course", "set_map", "set_thickness_curve", "thickness_curve_of"]
 
 
 def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any) -> MapSettings:
@@ -22,8 +22,9 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     setting: such as "look.color", "styles.Curl.radius" of the style with the name Curl, or "guides.length" of its
     guides; source: an image, or "image:NAME", "group:NAME" of
     a vertex group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or
-    "clump" for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp. ramp:
-    a curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that gives the colors.
+    "clump" for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp,
+    course. ramp: a curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that
+    gives the colors; course: as of `set_course`, by default the present one.
 
     >>> coat = bpy.data.images.new("Coat", 8, 8)
     >>> hair = bpy.data.objects["Hair"].data
@@ -39,11 +40,47 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     else:
         raise HairError(f"source must be an image or text, not {described(source)}.")
     varied_settings.require_varied(setting)
-    settings = changed(MapSettings, MapSettings(setting=setting, kind=kind, source=name), changes)
+    course = _course_of(target, setting)
+    settings = changed(MapSettings, MapSettings(setting=setting, kind=kind, source=name, course=course), changes)
     varied_settings.require_map(settings)
     _require_style(target, setting)
     blender.settings.map_items.keep(target.vellus, settings)
     return settings
+
+
+def set_course(hair: Curves, setting: str, curve: str = "") -> None:
+    """Multiply a setting of a style from root to tip by a curve, such as "0:1 0.5:0.3 1:0"; empty: remove the curve.
+
+    setting: such as "styles.Curl.radius" of the style with the name Curl; its map, if it has one, stays. Points of the
+    curve: as of `set_thickness_curve`.
+
+    >>> hair = bpy.data.objects["Hair"].data
+    >>> style = api.add_style(hair, "CURL")
+    >>> api.set_course(hair, "styles.Curl.radius", "0:0 0.3:1 1:0.4")
+    >>> api.maps_of(hair)[0].course
+    '0:0 0.3:1 1:0.4'
+    >>> api.set_course(hair, "styles.Curl.radius")
+    """
+    target = _editable(hair, setting)
+    if not isinstance(curve, str):
+        raise HairError(f"curve must be text, not {described(curve)}.")
+    ramp_text.require_curve(curve)
+    varied_settings.require_course(setting)
+    _require_style(target, setting)
+    items = blender.settings.map_items
+    item = items.item_of(target.vellus, setting)
+    if item is None and curve:
+        item = items.add(target.vellus, setting)
+    if item is not None:
+        items.set_course(item, curve)
+        if not curve and not items.is_set(item):
+            items.remove(target.vellus, setting)
+
+
+def _course_of(target, setting):
+    """Return the text of the curve of a setting from root to tip; empty without one."""
+    item = blender.settings.map_items.item_of(target.vellus, setting)
+    return "" if item is None else blender.settings.ramp_nodes.text_of(item.course_tree)
 
 
 def _require_style(target, setting):
@@ -73,7 +110,8 @@ def clear_map(hair: Curves, setting: str) -> bool:
     >>> api.clear_map(bpy.data.objects["Hair"], "look.color")
     True
     """
-    varied_settings.require_varied(setting)
+    if varied_settings.style_of(setting)[1] not in varied_settings.with_course():
+        varied_settings.require_varied(setting)
     return blender.settings.map_items.remove(_editable(hair, setting).vellus, setting)
 
 

@@ -73,6 +73,8 @@ _OPERATORS = {
         "remove_ramp",
         "add_map_ramp",
         "remove_map_ramp",
+        "add_course",
+        "remove_course",
         "remove_map",
     ),
     "lookup_tables": ("bake_tables",),

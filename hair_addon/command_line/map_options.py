@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of maps, --map look.color=image:coat.png, again for other settings; and of the thickness curve."""
+"""Options of maps, --map look.color=image:coat.png, again for other settings; and of curves from root to tip."""
 
 import argparse
 from dataclasses import replace
@@ -28,6 +28,15 @@ def add_maps(parser):
         "with fields after a comma, as in look.melanin=group:dark,low=0.5 or "
         f"'look.color=strand,ramp=0:0.1/0.05/0 1:1/0.8/0.5'; settings: {known}, "
         "and settings of styles by their names, such as styles.Curl.radius",
+    )
+    parser.add_argument(
+        "--course",
+        dest="courses",
+        metavar="SETTING=POINTS",
+        type=_parsed_course,
+        action="append",
+        default=[],
+        help="multiply a number of a style from root to tip by a curve, as in 'styles.Curl.radius=0:0 0.3:1 1:0.4'",
     )
     parser.add_argument(
         "--thickness-curve",
@@ -63,9 +72,23 @@ def _parsed_curve(text):
     return text
 
 
+def _parsed_course(text):
+    """Parse SETTING=POINTS as (setting, text of a curve)."""
+    setting, is_given, points = text.partition("=")
+    if not is_given or not points.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} needs a curve, as in 'styles.Curl.radius=0:0 0.3:1 1:0.4'")
+    try:
+        varied_settings.require_course(setting.strip())
+    except HairError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return setting.strip(), _parsed_curve(points)
+
+
 def mapped(given, settings):
-    """Return `GroomSettings` with the maps and the curve of options; images are loaded. Raises `HairError`."""
+    """Return `GroomSettings` with the maps and the curves of options; images are loaded. Raises `HairError`."""
     maps = {one.setting: one for one in (*settings.maps, *map(_loaded, given.maps))}
+    for setting, course in given.courses:
+        maps[setting] = replace(maps.get(setting, MapSettings(setting=setting)), course=course)
     curve = settings.thickness_curve if given.thickness_curve is None else given.thickness_curve
     return replace(settings, maps=tuple(maps.values()), thickness_curve=curve)
 

@@ -36,7 +36,7 @@ class ReadStyles:
 
     applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
     shapes, to the present ones; length: source of the map of the strands' length; map_status: sentence about a missing
-    source of a map; numbers: of styles that maps vary.
+    source of a map; numbers: of styles that maps or curves vary.
     """
 
     styles: tuple[StyleSettings, ...] = ()
@@ -155,7 +155,11 @@ def bind(
         settings,
         read.styles,
         make_trees(),
-        replace(read.inputs, numbers=varied_styles.number_maps(read.numbers)),
+        replace(
+            read.inputs,
+            numbers=varied_styles.number_maps(read.numbers),
+            courses=varied_styles.courses(read.numbers),
+        ),
         grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
         progress,
         cut,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers of styles that differ between strands by maps, such as the radius of curls."""
+"""Numbers of styles that differ between strands by maps, or from root to tip by curves, such as the radius of curls."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +13,7 @@ from ...core.maps import combination, varied_settings
 from ...core.params import Param
 from ...core.styling import lean, program, wet
 from ...core.styling.base import StyleSettings
+from ...core.styling.courses import are_same as are_same_courses
 from ...core.styling.varied_numbers import NumberMap
 from ..data.maps import ramps, sources
 from ..data.surfaces import Surface
@@ -23,25 +24,32 @@ _OF_PLACES = ("IMAGE", "GROUP", "ATTRIBUTE")  # strands of a lock share the valu
 
 @dataclass(frozen=True, eq=False)
 class VariedNumber:
-    """A setting of a style that a map varies: its value, its `Param`, and the `Source` of the map."""
+    """A setting of a style that a map or a curve varies: its value and its `Param`.
+
+    source: `Source` of the map; course: (N,) samples of the curve from root to tip; None without.
+    """
 
     value: float
     details: Param
-    source: sources.Source
+    source: sources.Source | None
+    course: np.ndarray | None
 
     def is_same(self, other: "VariedNumber") -> bool:
         """Whether both give the same values at the same roots."""
-        return self.value == other.value and self.source.is_same(other.source)
+        if self.source is None or other.source is None:
+            is_same = self.source is other.source
+        else:
+            is_same = self.value == other.value and self.source.is_same(other.source)
+        return is_same and are_same_courses(self.course, other.course)
 
-    @property
-    def number_map(self) -> NumberMap:
-        """The values for strands."""
+    def number_map(self, source: sources.Source) -> NumberMap:
+        """Return the values for strands; source: of the map."""
 
         def values(roots: SurfacePoints, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
-            masks = self.source.values(roots, identities, clumps)[:, 0]
-            return combination.varied_number(self.value, masks, self.source.combination, self.details)
+            masks = source.values(roots, identities, clumps)[:, 0]
+            return combination.varied_number(self.value, masks, source.combination, self.details)
 
-        return NumberMap(values, self.source.settings.kind in _OF_PLACES)
+        return NumberMap(values, source.settings.kind in _OF_PLACES)
 
 
 Numbers = Mapping[tuple[int, str], VariedNumber]  # by (index of the style, name of its setting)
@@ -50,7 +58,8 @@ Numbers = Mapping[tuple[int, str], VariedNumber]  # by (index of the style, name
 def read(
     hair: Curves | None, surface_object: Object | None, surface: Surface, styles: Sequence[StyleSettings]
 ) -> tuple[Numbers, str]:
-    """Return ({(index of the style, setting): `VariedNumber`} of hair, a sentence about a missing source).
+    """Return ({(index of the style, setting): `VariedNumber`} of hair, a sentence about a missing source or a map
+    without an effect).
 
     hair: None if it is new; styles: of the hair, as Curves store them.
     """
@@ -58,25 +67,40 @@ def read(
     names = () if hair is None else style_items.names_of(hair.vellus)
     for item in () if hair is None or len(names) != len(styles) else hair.vellus.maps:
         name, setting = varied_settings.style_of(item.setting)
-        if name not in names or not map_items.is_set(item):
+        course = ramps.samples(item.course_tree)
+        if name not in names or not (map_items.is_set(item) or course is not None):
             continue
         place = names.index(name)
         details = varied_settings.details_of_style(styles[place], setting)
         if details is None:
             continue
+        source = None
         try:
-            settings = map_items.settings_of(item)
-            if not _has_values(settings.kind, styles[place], setting, details):
-                raise HairError(_WITHOUT_VALUES, setting=item.setting)
-            if settings.kind == "CLUMP" and not program.tree_levels(styles):
-                raise HairError("There are no clumps for a random map: add the style Clump.")
-            ramp = ramps.map_samples(item, False)
-            source = sources.read(hair, surface_object, surface, settings, item.image, ramp=ramp)
-            value = getattr(styles[place], setting)
-            found[place, setting] = VariedNumber(value, _limited(details, setting, value), source)
+            if course is not None and not details.has_course:
+                course = None
+                raise HairError('"{setting}" has no curve from root to tip: remove the curve.', setting=item.setting)
+            if map_items.is_set(item):
+                source = _source(item, hair, surface_object, surface, styles, place, details)
         except HairError as error:
             status = str(error)
+        if source is not None or course is not None:
+            value = getattr(styles[place], setting)
+            found[place, setting] = VariedNumber(value, _limited(details, setting, value), source, course)
     return found, status
+
+
+def _source(item, hair, surface_object, surface, styles, place, details):
+    """Return the `Source` of a map of a style's setting. Raises `HairError`."""
+    setting = varied_settings.style_of(item.setting)[1]
+    settings = map_items.settings_of(item)
+    if not details.may_vary:
+        raise HairError('No map can vary "{setting}": use the mask of the style.', setting=item.setting)
+    if not _has_values(settings.kind, styles[place], setting, details):
+        raise HairError(_WITHOUT_VALUES, setting=item.setting)
+    if settings.kind == "CLUMP" and not program.tree_levels(styles):
+        raise HairError("There are no clumps for a random map: add the style Clump.")
+    ramp = ramps.map_samples(item, False)
+    return sources.read(hair, surface_object, surface, settings, item.image, ramp=ramp)
 
 
 _WITHOUT_VALUES = 'Clumps and attributes of strands cannot vary "{setting}": pick another kind of map.'
@@ -112,5 +136,10 @@ def are_same(numbers: Numbers, others: Numbers) -> bool:
 
 
 def number_maps(numbers: Numbers) -> dict[tuple[int, str], NumberMap]:
-    """Return the `NumberMap` of each varied number."""
-    return {key: found.number_map for key, found in numbers.items()}
+    """Return the `NumberMap` of each number that a map varies."""
+    return {key: found.number_map(found.source) for key, found in numbers.items() if found.source is not None}
+
+
+def courses(numbers: Numbers) -> dict[tuple[int, str], np.ndarray]:
+    """Return the samples of the curve of each number that has one."""
+    return {key: found.course for key, found in numbers.items() if found.course is not None}

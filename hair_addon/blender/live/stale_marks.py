@@ -239,14 +239,18 @@ def follow_ramps():
             if is_other and (curves.is_hand_made(hair) or not curves.is_combed(hair)):
                 state.is_stale = True
         for item in state.maps:
-            if item.ramp_tree is None:
-                continue
-            _own_ramp(item, "ramp_tree", owners)
-            key = ramp_nodes.text_of(item.ramp_tree)
-            if key != item.ramp_key and hair.is_editable:
-                item.ramp_key = key
-                if _has_effect(hair, item):
-                    marks.mark_changed_map(item)
+            for name in ("ramp", "course"):
+                if getattr(item, f"{name}_tree") is not None:
+                    _follow_ramp_of_map(hair, item, name, owners)
+
+
+def _follow_ramp_of_map(hair, item, name, owners):
+    _own_ramp(item, f"{name}_tree", owners)
+    key = ramp_nodes.text_of(getattr(item, f"{name}_tree"))
+    if key != getattr(item, f"{name}_key") and hair.is_editable:
+        setattr(item, f"{name}_key", key)
+        if _has_effect(hair, item):
+            marks.mark_changed_map(item)
 
 
 def _own_ramp(owner, name, owners):

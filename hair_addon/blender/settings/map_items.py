@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import bpy
 
-from ...core.maps import varied_settings
+from ...core.maps import ramp_text, varied_settings
 from ...core.maps.map_settings import MapSettings
 from ..host.notices import name_of
 from . import ramp_nodes, setting_properties
@@ -24,7 +24,7 @@ class VellusMap(bpy.types.PropertyGroup):
     """A map that varies a setting over the hair"""
 
     __annotations__ = {
-        **setting_properties.annotations(MapSettings, mark_map, skip=("source", "ramp")),
+        **setting_properties.annotations(MapSettings, mark_map, skip=("source", "ramp", "course")),
         "source": bpy.props.StringProperty(
             name="Name",
             description="Name of the vertex group or attribute",
@@ -47,6 +47,15 @@ class VellusMap(bpy.types.PropertyGroup):
             update=mark_map,
         ),
         "ramp_key": bpy.props.StringProperty(description="The ramp at the last update", options={"HIDDEN"}),
+        "course_tree": bpy.props.PointerProperty(
+            name="Curve",
+            description="Node group with the curve of the setting from root to tip",
+            translation_context=CONTEXT,
+            type=bpy.types.NodeTree,
+            options={"HIDDEN"},
+            update=mark_map,
+        ),
+        "course_key": bpy.props.StringProperty(description="The curve at the last update", options={"HIDDEN"}),
     }
 
 
@@ -55,7 +64,8 @@ CLASSES = (VellusMap,)
 
 def settings_of(item: VellusMap) -> MapSettings:
     """Return the `MapSettings` of an item. Raises `HairError`."""
-    found = setting_properties.to_settings(item, MapSettings, skip=("ramp",))
+    found = setting_properties.to_settings(item, MapSettings, skip=("ramp", "course"))
+    found = replace(found, course=ramp_nodes.text_of(item.course_tree))
     if item.ramp_tree is not None:
         found = replace(found, ramp=ramp_nodes.text_of(item.ramp_tree))
     if found.kind != "IMAGE":
@@ -95,10 +105,24 @@ def read_faces(state) -> bool:
 
 def set_ramp(item: VellusMap, text: str) -> None:
     """Give a map the ramp of a text, or none for an empty text. Raises `HairError` before anything changes."""
-    before = item.ramp_tree
-    wanted = ramp_nodes.replaced(before, item.id_data, "Ramp", text)
+    _set_tree(item, "ramp", "Ramp", text)
+
+
+def set_course(item: VellusMap, text: str) -> None:
+    """Give a setting the curve of a text from root to tip, or none for an empty text.
+
+    Raises `HairError` before anything changes.
+    """
+    ramp_text.require_curve(text)
+    _set_tree(item, "course", "Curve", text)
+
+
+def _set_tree(item, name, label, text):
+    before = getattr(item, f"{name}_tree")
+    wanted = ramp_nodes.replaced(before, item.id_data, label, text)
     if wanted != before:
-        item.ramp_tree, item.ramp_key = wanted, ramp_nodes.text_of(wanted)
+        setattr(item, f"{name}_key", ramp_nodes.text_of(wanted))
+        setattr(item, f"{name}_tree", wanted)
         ramp_nodes.remove_unused(before)
 
 
@@ -116,9 +140,10 @@ def keep(state, settings: MapSettings) -> VellusMap:
     item.setting = settings.setting
     item.image = bpy.data.images.get(settings.source) if settings.kind == "IMAGE" else None
     for name in setting_properties.names_of(MapSettings):
-        if name != "ramp":
+        if name not in ("ramp", "course"):
             setattr(item, name, getattr(settings, name))
     set_ramp(item, settings.ramp)
+    set_course(item, settings.course)
     return item
 
 
@@ -127,9 +152,10 @@ def remove(state, setting: str) -> bool:
     for index, item in enumerate(state.maps):
         if item.setting == setting:
             mark_map(item, None)
-            tree = item.ramp_tree
+            trees = item.ramp_tree, item.course_tree
             state.maps.remove(index)
-            ramp_nodes.remove_unused(tree)
+            for tree in trees:
+                ramp_nodes.remove_unused(tree)
             return True
     return False
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rows of a map: its kind, the picker of this kind, and how it changes its setting; the curve of the thickness."""
+"""Rows of a map: its kind, the picker of this kind, and how it changes its setting; curves from root to tip."""
 
 import textwrap
 
 from ...core.errors import HairError
 from ...core.maps import varied_settings
+from ...core.styling import kinds
 from ..data.strands import curves
 from ..groom.styles import painted_maps
 from ..settings import map_items, ramp_nodes
@@ -16,7 +17,7 @@ _CHARACTERS = 44  # of a line of the popover
 def button(layout, state, setting):
     """Draw the button of a setting that a map may vary; its icon is colored where there is a map."""
     item = map_items.item_of(state, setting)
-    has_map = item is not None and map_items.is_set(item)
+    has_map = item is not None and (map_items.is_set(item) or item.course_tree is not None)
     icon = "NODE_TEXTURE" if has_map else "DOT"
     side = layout.row()
     side.emboss = "NONE"
@@ -34,6 +35,24 @@ def draw(layout, item, hair):
         layout.enabled = False
     layout.use_property_split = True
     layout.use_property_decorate = False
+    details = _details(item, hair)
+    if details is None or details.may_vary:
+        _source_rows(layout, item, hair)
+    if details is not None and details.has_course:
+        _course_rows(layout, item)
+    layout.operator("vellus.remove_map", icon="X").setting = item.setting
+
+
+def _details(item, hair):
+    """Return the `Param` of a setting of a style; None for other settings."""
+    name, setting = varied_settings.style_of(item.setting)
+    styles = (style for style in hair.vellus.styles if style.name == name)
+    kind = next((kinds.KINDS[style.kind] for style in styles), None)
+    return None if kind is None else varied_settings.details_of_style(kind(), setting)
+
+
+def _source_rows(layout, item, hair):
+    """Draw the source of a map, and how the map changes its setting."""
     layout.prop(item, "kind")
     surface = curves.grown_on(hair)
     if item.kind == "IMAGE":
@@ -57,7 +76,18 @@ def draw(layout, item, hair):
         layout.prop(item, "high")
     layout.prop(item, "is_inverted")
     _map_ramp_rows(layout, item)
-    layout.operator("vellus.remove_map", icon="X").setting = item.setting
+
+
+def _course_rows(layout, item):
+    """Draw the curve of a setting from root to tip, or the button that adds it."""
+    layout.separator()
+    node = ramp_nodes.node_of(item.course_tree)
+    if node is None:
+        layout.operator("vellus.add_course", icon="NORMALIZE_FCURVES").setting = item.setting
+        return
+    layout.label(text="From root to tip")
+    layout.template_curve_mapping(node, "mapping")
+    layout.operator("vellus.remove_course", icon="X").setting = item.setting
 
 
 def _map_ramp_rows(layout, item):

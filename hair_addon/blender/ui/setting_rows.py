@@ -92,7 +92,11 @@ def rows(layout, owner, settings_class, names, style=""):
     for name, _default, details in declared(settings_class):
         if name in names:
             known = varied_settings.setting_of_style(style, name) if style else ""
-            varied = (known or varied_settings.name_of(settings_class, name)) if details.may_vary else ""
+            varied = (
+                (known or varied_settings.name_of(settings_class, name))
+                if details.may_vary or details.has_course
+                else ""
+            )
             is_stored = varied != "" and isinstance(getattr(owner, "id_data", None), bpy.types.Curves)  # not redo
             row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
 
@@ -186,7 +190,7 @@ def _density_rows(layout, owner, surface):
 def style_rows(layout, item):
     """Settings of a style except its mask and profile; item: its properties."""
     owner, settings_class = style_items.group_of(item), KINDS[item.kind]
-    row(layout, owner, "amount")
+    rows(layout, owner, settings_class, ("amount",), text_of(item, "name"))
     shared = setting_properties.names_of(StyleSettings)
     rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS), text_of(item, "name"))
     for name in _STYLE_OBJECTS:

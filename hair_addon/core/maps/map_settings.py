@@ -34,10 +34,17 @@ class MapSettings(Settings):
     )
     seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     ramp: str = param("", "Curve of the map's values, or color ramp of a color, such as 0:1 0.5:0.3 1:0.2")
+    course: str = param("", "Curve from root to tip that multiplies a setting of a style, such as 0:1 1:0.2")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         ramp_text.parsed(self.ramp)
+        ramp_text.require_curve(self.course)
+
+    @property
+    def has_source(self) -> bool:
+        """Whether the map has a source: otherwise it has no values, and only its course has an effect."""
+        return self.kind in ("STRAND", "CLUMP") or self.source != ""
 
     @property
     def combination(self) -> Combination:

@@ -9,7 +9,7 @@ from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared
 from ..shading.appearance import COLOR_FIELDS, Appearance
-from ..styling import kinds
+from ..styling import courses, kinds
 from ..styling.base import StyleSettings
 from . import map_settings, ramp_text
 
@@ -58,14 +58,30 @@ def setting_of_style(name: str, setting: str) -> str:
 
 
 def details_of_style(settings: StyleSettings, name: str) -> Param | None:
-    """Return the `Param` of a style's setting; None if no map can vary it."""
-    return next((d for its_name, _, d in declared(type(settings)) if its_name == name and d.may_vary), None)
+    """Return the `Param` of a style's setting; None if neither a map nor a curve can vary it."""
+    known = ((its_name, details) for its_name, _default, details in declared(type(settings)))
+    return next((d for its_name, d in known if its_name == name and (d.may_vary or d.has_course)), None)
 
 
 @cache
 def of_styles() -> tuple[str, ...]:
     """Return the names of the settings of styles that may vary, without the names of styles."""
     return tuple(dict.fromkeys(name for kind in kinds.KINDS for name in kinds.varied_settings_of(kind)))
+
+
+@cache
+def with_course() -> frozenset[str]:
+    """Return the names of the settings of styles that a curve from root to tip may multiply, without styles' names."""
+    return frozenset(name for kind in kinds.KINDS.values() for name in courses.settings_with_course(kind))
+
+
+def require_course(setting: str) -> None:
+    """Raise `HairError` unless a setting such as "styles.Curl.radius" may have a curve from root to tip."""
+    name, of_style = style_of(setting)
+    if not name or of_style not in with_course():
+        known = ", ".join(setting_of_style("NAME", each) for each in sorted(with_course()))
+        sentence = '"{setting}" has no curve from root to tip: use one of {known}.'
+        raise HairError(sentence, setting=setting, known=known)
 
 
 def require_varied(setting: str) -> None:
@@ -77,8 +93,14 @@ def require_varied(setting: str) -> None:
 
 
 def require_map(settings: map_settings.MapSettings) -> None:
-    """Raise `HairError` unless a map may vary its setting and has a ramp of the setting's kind."""
-    require_varied(settings.setting)
+    """Raise `HairError` unless a map may vary its setting and has a ramp of the setting's kind.
+
+    A map without a source may have only a curve from root to tip.
+    """
+    if settings.course:
+        require_course(settings.setting)
+    if settings.has_source or not settings.course:
+        require_varied(settings.setting)
     ramp = ramp_text.parsed(settings.ramp)
     if isinstance(ramp, ramp_text.Curve) and is_color(settings.setting):
         raise HairError('The map of "{setting}" needs a color ramp, not a curve.', setting=settings.setting)

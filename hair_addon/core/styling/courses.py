@@ -39,6 +39,13 @@ def at(course: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.interp(x, np.linspace(0.0, 1.0, len(course)), course)
 
 
+def are_same(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    """Return whether two courses, None for absent ones, are the same."""
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
+
+
 class Table:
     """The distinct courses of a program, in rows."""
 

@@ -49,8 +49,8 @@ class Lean:
             (self.amounts, other.amounts),
             (self.directions, other.directions),
             (self.clearances, other.clearances),
-            (self.curve, other.curve),
         )
+        is_same = is_same and courses.are_same(self.curve, other.curve)
         return is_same and all(np.array_equal(*pair) for pair in arrays)
 
     def course(self, chosen: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -21,7 +21,8 @@ def setting_property():
 
 
 class VELLUS_OT_edit_map(HairOperator, bpy.types.Operator):
-    """Vary this setting over the hair by an image, a vertex group, an attribute or random numbers"""
+    """Vary this setting over the hair by an image, a vertex group, an attribute or random numbers, or from root \
+to tip by a curve"""
 
     bl_idname = "vellus.edit_map"
     bl_label = "Edit Map"
@@ -128,6 +129,39 @@ class VELLUS_OT_remove_map_ramp(HairOperator, bpy.types.Operator):
         map_items.set_ramp(item, "")
 
 
+class VELLUS_OT_add_course(HairOperator, bpy.types.Operator):
+    """Multiply the setting from root to tip by a curve, which begins as 1 everywhere"""
+
+    bl_idname = "vellus.add_course"
+    bl_label = "Curve from Root to Tip"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Add a curve from root to tip to a setting of a style."""
+        varied_settings.require_course(self.setting)
+        hair = hair_of(context.object)
+        require_editable(hair)
+        item = map_items.item_of(hair.vellus, self.setting) or map_items.add(hair.vellus, self.setting)
+        if ramp_nodes.node_of(item.course_tree) is None:
+            map_items.set_course(item, "0:1 1:1")
+
+
+class VELLUS_OT_remove_course(HairOperator, bpy.types.Operator):
+    """Remove the curve: the setting is the same from root to tip"""
+
+    bl_idname = "vellus.remove_course"
+    bl_label = "Remove Curve"
+    applies = needs_hair
+    __annotations__ = {"setting": setting_property()}
+
+    def change(self, context):
+        """Remove the curve of a setting from root to tip."""
+        varied_settings.require_course(self.setting)
+        _hair, item = _editable_map(context, self.setting)
+        map_items.set_course(item, "")
+
+
 def _editable_map(context, setting):
     """Return (Curves that have a setting, item of its map). Raises `HairError`."""
     owner = _owner_of(context, setting)
@@ -140,7 +174,8 @@ def _editable_map(context, setting):
 
 def _owner_of(context, setting):
     """Return the active hair or guides, whichever have a setting that may vary. Raises `HairError`."""
-    varied_settings.require_varied(setting)
+    if varied_settings.style_of(setting)[1] not in varied_settings.with_course():
+        varied_settings.require_varied(setting)
     owner = guides_of(context.object) if varied_settings.is_of_guides(setting) else hair_of(context.object)
     if owner is None:
         raise HairError("Select hair or guides.")
@@ -177,5 +212,7 @@ CLASSES = (
     VELLUS_OT_remove_ramp,
     VELLUS_OT_add_map_ramp,
     VELLUS_OT_remove_map_ramp,
+    VELLUS_OT_add_course,
+    VELLUS_OT_remove_course,
     VELLUS_OT_remove_map,
 )
