@@ -53,6 +53,7 @@ PURE = {
     "core/maps/pixels.py: _linear_bytes",
     "core/maps/varied_settings.py: all_varied",
     "core/maps/varied_settings.py: of_styles",
+    "core/maps/varied_settings.py: with_course",
     "core/params.py: _declared",
     "core/shading/appearance.py: _mean_reflectance",
     "core/shading/appearance.py: neutral",

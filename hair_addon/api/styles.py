@@ -19,9 +19,8 @@ from ..core.params import Param, array_of, declared, described, plain_value
 from ..core.styling import lean, trim
 from ..core.styling.base import StyleSettings
 from ..core.styling.kinds import OFFERS, kind_of
-from ..core.styling.masks import Mask
+from ..core.styling.masks import Inputs, Mask
 from ..core.styling.program import mask_keys
-from ..core.styling.style_inputs import Inputs
 from . import systems
 from .arguments import changed, checked_progress, choice
 from .blender_access import blender

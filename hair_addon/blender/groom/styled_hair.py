@@ -18,7 +18,7 @@ from ...core.long_work import Progress, no_progress
 from ...core.styling import program
 from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
-from ...core.styling.style_inputs import Inputs
+from ...core.styling.masks import Inputs
 from ..data import surface_space
 from ..data.maps.sources import Source
 from ..data.strands import style_inputs

@@ -17,8 +17,7 @@ from ..interpolation.root_binder import RootBinder
 from ..long_work import Progress, no_progress
 from ..styling.base import StyleSettings
 from ..styling.clump_trees import ClumpTrees
-from ..styling.masks import CutMask
-from ..styling.style_inputs import Inputs
+from ..styling.masks import CutMask, Inputs
 from . import groom, groom_defaults
 from .groom import HairSettings
 

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         base,
         clump_trees,
+        courses,
         fitting,
         guide_lean,
         guide_styles,
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
         stack,
         steps,
         strand_wetness,
-        style_inputs,
         style_text,
         varied_numbers,
     )

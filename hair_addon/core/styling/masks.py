@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks: weights at roots that multiply the amount of a style."""
+"""Inputs of styles: masks, which are weights at roots that multiply the amount of a style; planes, directions, maps."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from ..geometry.faces.uv_maps import Texture
 from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
 from ..kernels.checks import require_count, require_indices
+from .base import Cutter
+from .courses import Courses
+from .varied_numbers import NumberMap
 
 
 @dataclass(frozen=True)
@@ -77,3 +80,18 @@ class CutMask:
     def of_guides(self, roots: SurfacePoints) -> np.ndarray:
         """Return (G,) float32 zeros: guides keep their length."""
         return np.zeros(len(roots), np.float32)
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects.
+
+    numbers: values that differ between strands, by (index of the style, name of its setting);
+    courses: curves from root to tip of numbers, by the same keys.
+    """
+
+    masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
+    cutters: Mapping[str, Cutter] = field(default_factory=dict)
+    targets: Mapping[str, np.ndarray] = field(default_factory=dict)
+    numbers: Mapping[tuple[int, str], NumberMap] = field(default_factory=dict)
+    courses: Courses = field(default_factory=dict)

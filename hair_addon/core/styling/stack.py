@@ -23,9 +23,9 @@ from . import program as programs
 from .base import StyleSettings, TreeSettings, has_effect
 from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
+from .masks import Inputs
 from .program import Program, mask_key
 from .steps import StrandData
-from .style_inputs import Inputs
 
 if TYPE_CHECKING:
     from ..interpolation.guide_weights import Reach

@@ -8,7 +8,7 @@ import pytest
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.styling import bend, braid, clump, courses, curl, frizz, kinds, lean, smooth
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs
 from tests.support.strands.styled import head
 
 # Style, other styles above it.

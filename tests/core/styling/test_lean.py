@@ -10,7 +10,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
 from hair_addon.core.styling import guide_lean, lean, wet
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs
 from tests.support.strands.styled import ball, head, straight
 
 ALL = {"root": 1.0, "tip": 1.0}

@@ -11,8 +11,7 @@ import warp as wp
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
 from hair_addon.core.grooming import hair_styles
 from hair_addon.core.styling import base, bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
-from hair_addon.core.styling.masks import Mask
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs, Mask
 from tests.support.devices import DEVICE
 from tests.support.dynamics.stepped import UP, curved_strands, largest_move, rotation, stepped
 from tests.support.strands.styled import head

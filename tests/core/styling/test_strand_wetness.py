@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import program, random_numbers, strand_wetness, wet
-from hair_addon.core.styling.masks import Mask
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs, Mask
 from tests.support.strands.styled import straight
 
 WET = wet.Settings(lock=0.03, seed=3)

@@ -10,7 +10,7 @@ import warp as wp
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs
 from hair_addon.core.styling.varied_numbers import NumberMap
 from tests.support.strands.styled import head
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import braid, clump, curl, wet
+from hair_addon.core.styling.masks import Inputs
 from hair_addon.core.styling.program import tree_settings
-from hair_addon.core.styling.style_inputs import Inputs
 from hair_addon.core.styling.varied_numbers import MOST_SIZES, NumberMap, varied_trees
 from tests.support.strands.styled import head
 

@@ -10,9 +10,8 @@ from ....core import geometry
 from ....core.errors import HairError
 from ....core.styling import lean, trim
 from ....core.styling.base import Cutter, StyleSettings, has_effect
-from ....core.styling.masks import Mask
+from ....core.styling.masks import Inputs, Mask
 from ....core.styling.program import mask_keys
-from ....core.styling.style_inputs import Inputs
 from ...host.notices import name_of
 from .. import scene
 from . import attributes

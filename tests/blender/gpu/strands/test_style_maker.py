@@ -14,8 +14,7 @@ from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
 from hair_addon.core.styling.base import Cutter
 from hair_addon.core.styling.courses import settings_with_course
-from hair_addon.core.styling.masks import Mask
-from hair_addon.core.styling.style_inputs import Inputs
+from hair_addon.core.styling.masks import Inputs, Mask
 from hair_addon.core.styling.varied_numbers import NumberMap
 from tests.support.pictures import drawn_strands
 from tests.support.strands.styled import head
