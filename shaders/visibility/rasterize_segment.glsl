@@ -16,7 +16,7 @@
 // HAS_TILES
 //     tiles may be occluded, and samples may be jittered
 
-// Consecutive segments per thread: their points are read and projected once.
+// Most consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
 // Minimum half width [samples] for filled bends and disks at ends: those of thinner strands are smaller than a sample.
@@ -203,8 +203,9 @@ void walk_run(ivec2 size)
     return;
   }
   int strand = drawn_strand(turn);
-  int piece = index % runs * RUN_LENGTH;
-  int last = min(piece + RUN_LENGTH, pieces);
+  // The runs of a strand are equally long, as threads that run together wait for the longest.
+  int piece = index % runs * pieces / runs;
+  int last = (index % runs + 1) * pieces / runs;
   ivec2 texel = strand_first(strand);
   vec4 head = packed_head(strands, texel);
   vec4 first = strand_point(strand, texel, head, piece_start(piece));

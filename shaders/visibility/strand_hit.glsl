@@ -43,6 +43,16 @@ void find_place(int index, vec2 at, vec2 size)
   vec2 radii = vec2(first.w, second.w);
   bool is_in_front = segment_in_front(to_clip(first), to_clip(second), radii, size, axis_place(size), drawn_segment);
   float t = is_in_front ? place_on_segment(drawn_segment, at) : 0.0;
+  if (end - start > 1) {
+    // The light is that of the strand's own place: with fewer points strands cut through the hair below them, where it is
+    // dark.
+    float place = mix(float(start), float(end), t);
+    start = min(int(place), end - 1);
+    end = start + 1;
+    t = place - float(start);
+    first = strand_point(strand_index, texel, head, start);
+    second = strand_point(strand_index, texel, head, end);
+  }
   vec3 before = packed_place(strands, texel, head, max(start - 1, 0));
   vec3 after = packed_place(strands, texel, head, min(end + 1, view.point_count - 1));
   vec3 near_start = packed_place(strands, texel, head, start + 1);

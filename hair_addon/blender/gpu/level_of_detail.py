@@ -15,7 +15,7 @@ from . import drawing
 
 # Maximum width of strands that represent others, in samples and as a part of the hair's diameter: thicker strands would
 # widen the tips of locks and the outline.
-_FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 2500.0
+_FULL_WIDTH, _WIDTH_PART = 0.5, 1.0 / 1000.0
 # Distance between two points [samples], and the greatest distance [samples] of a bend from the line between two points
 # at which a strand may have fewer points.
 _PIECE_LENGTH, _GREATEST_BEND = 2.0, 0.5
