@@ -2,12 +2,14 @@
 // Solid shading with a color type other than Material, or with a matcap: needs the block solid and the samplers strand_tints
 // and matcap, which has the layer of highlights above that of diffuse light.
 
+#include "fibre/solid_tint.glsl"
+
 const float LEAST_TINT = 1e-3;
 
 vec3 strand_tint()
 {
   ivec2 texel = ivec2(strand_index % view.row_strands, strand_index / view.row_strands);
-  vec3 tint = (solid.has_strand_tints != 0) ? texelFetch(strand_tints, texel, 0).rgb : solid.tint.rgb;
+  vec3 tint = (solid.has_strand_tints != 0) ? texelFetch(strand_tints, texel, 0).rgb : solid_tint();
   return max(tint, vec3(LEAST_TINT));
 }
 

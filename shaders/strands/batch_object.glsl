@@ -5,12 +5,14 @@
 
 View view;
 int first_run;  // of the object, in `seen_runs`
+int object_row;  // of the object, in the texture `objects`
 int object_layer;  // of the object, in the textures of the world's visibility
 
 const int NUMBER_TEXEL = 8;
 const int SEGMENT_TEXEL = 9;
 const int RUN_TEXEL = 10;
 const int GROUP_TEXEL = 11;
+const int TINT_TEXEL = 12;
 
 vec4 object_texel(int row, int texel)
 {
@@ -33,6 +35,7 @@ int whole_number(vec2 parts)
 
 void choose_object(int row)
 {
+  object_row = row;
   view = shared_view;
   view.object_to_world = object_matrix(row, 0);
   view.object_to_clip = object_matrix(row, 4);

@@ -33,6 +33,8 @@ class Shading:
     reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
     is_mapped: bool = False  # whether strands have looks of their own
+    tint: tuple = (1.0, 1.0, 1.0)  # color of all strands, relative to that of the look
+    untinted: tuple = ()  # a key of all but the tint: equal for shadings of linked hair that is drawn together
     # For the energy-conserving model: (`lookup_tables.Settings`, `strand_variation.Settings` or None).
     fibre: tuple | None = None
 
@@ -40,6 +42,11 @@ class Shading:
     def opacity(self):
         """Opacity of a strand, averaged over the channels."""
         return _opacity(self.forward)
+
+    @property
+    def key(self):
+        """A key that is equal for shadings that differ at most in their tint."""
+        return self.untinted or (id(self),)
 
     @property
     def layers(self):
@@ -78,6 +85,16 @@ class MixedShading:
     def opacity(self):
         """Opacity of a strand, averaged over the channels and strands."""
         return _opacity(self.forward)
+
+    @property
+    def key(self):
+        """A key that is equal for shadings that differ at most in their tint."""
+        return *self.driest.key, *self.wettest.key, self.wetness_range
+
+    @property
+    def tint(self):
+        """`Shading.tint`."""
+        return self.driest.tint
 
     @property
     def layers(self):

@@ -54,6 +54,8 @@ def _made(shading, solid):
         variant=partial(shading.variant, is_solid=True),
         blocks=shading.blocks | {"solid": uniforms.uniform_buffer(record)},
         samplers=shading.samplers | textures,
+        tint=solid.tint,
+        untinted=(id(shading), replace(solid, tint=PLAIN.tint)),
     )
 
 

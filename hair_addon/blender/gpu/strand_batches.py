@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing of linked hair objects, which share strands and look: the number of calls does not grow with the objects.
 
-A texture has a row with the transform and the level of detail of each object: see shaders/strands/batch_object.glsl.
+A texture has a row with the transform, the level of detail and the color of each object: see
+shaders/strands/batch_object.glsl.
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,16 +19,17 @@ from .strand_textures import StrandsOnGPU, run_for_each
 # Maximum number of objects with a common array texture: every driver supports this number of layers.
 MOST_LAYERS = 256
 
-_TEXELS = 12  # per object
+_TEXELS = 13  # per object
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Hair objects with the same strands, look, light and textures.
+    """Hair objects with the same strands, look, light and textures, whose tints may differ.
 
     to_world: (N, 4, 4); indices: (N,) among all hair of a picture; layers: (N,) layer of each object in the textures of
     the world's visibility, None for a single object with textures of its own; samplers: {name: texture} of the scene;
-    steps: `drawing.Steps`, whose numbers may be arrays (N,).
+    steps: `drawing.Steps`, whose numbers may be arrays (N,); tints: (N, 3) of the objects' shadings, None for a single
+    object.
     """
 
     strands: StrandsOnGPU
@@ -37,14 +39,15 @@ class Batch:
     layers: np.ndarray | None
     samplers: dict
     steps: drawing.Steps = field(default_factory=drawing.Steps)
+    tints: np.ndarray | None = None
 
     def part(self, chosen):
         """Return the batch of the objects in `chosen`, a list of indices of hair; new indices are places in it."""
         places, within = np.nonzero(np.asarray(chosen)[:, None] == self.indices)
-        numbers = self.layers, self.steps.point_count, self.steps.strand_count
-        layers, points, strands = (one[within] if isinstance(one, np.ndarray) else one for one in numbers)
+        numbers = self.layers, self.steps.point_count, self.steps.strand_count, self.tints
+        layers, points, strands, tints = (one[within] if isinstance(one, np.ndarray) else one for one in numbers)
         steps = replace(self.steps, point_count=points, strand_count=strands)
-        return replace(self, to_world=self.to_world[within], indices=places, layers=layers, steps=steps)
+        return replace(self, to_world=self.to_world[within], indices=places, layers=layers, steps=steps, tints=tints)
 
 
 def single(hair, index):
@@ -68,10 +71,11 @@ def groups_of(keys):
 class Objects:
     """The texture of the objects of a `Batch` that a picture shows, and their work groups.
 
-    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before these objects.
+    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before these objects;
+    tints: (N, 3), None for white.
     """
 
-    def __init__(self, records, layers, first_run):
+    def __init__(self, records, layers, first_run, tints=None):
         runs_of_strand = -(-(records["drawn_points"].astype(np.int64) - 1) // scene_programs.RUN_LENGTH)
         strands = records["drawn_strands"].astype(np.int64)
         first_share = -(-strands // drawing.FIRST_SHARE)
@@ -87,6 +91,7 @@ class Objects:
         rows[:, 9, :2], rows[:, 9, 2] = _halves(records["first_segment"]), layers
         rows[:, 10, :2] = _halves(first_run + np.cumsum(runs) - runs)
         rows[:, 11, :3] = (np.cumsum(groups, axis=1) - groups).T
+        rows[:, 12, :3] = 1.0 if tints is None else tints
         data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
         self.texture = gpu.types.GPUTexture((_TEXELS, len(texels)), format="RGBA32F", data=data)
         self.texture.filter_mode(False)

@@ -36,6 +36,7 @@ class _Placed:
     layers: np.ndarray | None  # (N,) as of the batch
     is_round: bool  # whether any strand is so wide that its bends and ends are visible
     first_run: int  # number of runs of segments before these objects
+    tints: np.ndarray | None  # (N, 3) as of the batch
 
     @cached_property
     def view(self):
@@ -47,7 +48,7 @@ class _Placed:
         """`strand_batches.Objects`; None for a single object with textures of its own."""
         if self.layers is None:
             return None
-        return strand_batches.Objects(self.records, self.layers, self.first_run)
+        return strand_batches.Objects(self.records, self.layers, self.first_run, self.tints)
 
     @property
     def window(self):
@@ -236,7 +237,8 @@ class VisibilityBuffer:
             block = light_block or uniforms.uniform_buffer(lights[batch.indices[0]])
             layers = None if batch.layers is None else batch.layers[are_seen]
             seen = batch.indices[are_seen], records[are_seen], block, places[are_seen], layers
-            found.append(_Placed(batch, *seen, bool(are_round[are_seen].any()), run_count))
+            tints = None if batch.tints is None else batch.tints[are_seen]
+            found.append(_Placed(batch, *seen, bool(are_round[are_seen].any()), run_count, tints))
             run_count += found[-1].run_count
         return found
 

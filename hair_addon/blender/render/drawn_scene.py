@@ -76,7 +76,9 @@ class DrawnScene:
             to_world = np.stack([self.hair[index][2] for index in indices])
             own = None if layers[indices[0]] is None else np.array([layers[index] for index in indices])
             samplers = self.hair_visibility[indices[0]]
-            found.append(strand_batches.Batch(strands, shading, to_world, np.array(indices), own, samplers))
+            tints = np.array([self.hair[index][1].tint for index in indices])
+            batch = strand_batches.Batch(strands, shading, to_world, np.array(indices), own, samplers, tints=tints)
+            found.append(batch)
         return found
 
     def _key(self, index):
@@ -84,7 +86,7 @@ class DrawnScene:
         strands, shading, _to_world, limits = self.hair[index]
         textures = tuple(map(id, self.hair_visibility[index].values()))
         lights = None if self.hair_lights is None else self.hair_lights[index].tobytes()
-        return id(strands), id(shading), limits, textures, lights
+        return id(strands), shading.key, limits, textures, lights
 
     @cached_property
     def occluders(self):
@@ -488,6 +490,7 @@ def _read_rendered_hair(depsgraph, known, refused, noted):
 def _read_hair(places, viewport, refused, shown, depsgraph):
     """Return (hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
+    solid_hair.make_room(len(places))
     for place in places:
         datablock = place.hair_object.data
         if viewport is not None and not datablock.vellus.is_drawn:

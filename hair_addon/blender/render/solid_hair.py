@@ -24,6 +24,12 @@ class _Tints:
 tint_cache = Cache(capacity=16)
 
 
+def make_room(count):
+    """Keep the colors of `count` objects, which are read in turn."""
+    for cache in (tint_cache, solid_shading.shading_cache):
+        cache.make_room(count)
+
+
 def is_tinted(shown):
     """Whether a `viewport_shading.ViewportShading` replaces the color of all looks."""
     return shown.color.kind in {"SINGLE", "OBJECT", "RANDOM"}

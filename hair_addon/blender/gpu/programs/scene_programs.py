@@ -24,6 +24,7 @@ _BATCH_REPLACED = {
     "strands/placement.glsl": "strands/batch_placement.glsl",
     "strands/run_group.glsl": "strands/batch_run_group.glsl",
     "light/strand_visibility.glsl": "light/layer_visibility.glsl",
+    "fibre/solid_tint.glsl": "strands/batch_tint.glsl",
 }
 _BATCH_SAMPLER = ("objects", "FLOAT_2D")
 

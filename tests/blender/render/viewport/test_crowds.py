@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender.data.pictures import drawn_meshes
-from hair_addon.blender.gpu import ambient_visibility, shadows, strand_batches, surface_textures
+from hair_addon.blender.data.pictures import drawn_meshes, viewport_shading
+from hair_addon.blender.gpu import ambient_visibility, shadows, solid_shading, strand_batches, surface_textures
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
 from hair_addon.blender.render.viewport.outline import HairOutline, OutlineStyle
@@ -45,8 +45,9 @@ def link(hair, places):
     return found
 
 
-def read():
-    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+def read(**options):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, **options)
 
 
 def pictures(drawn, channels, is_shadowed=False):
@@ -78,6 +79,26 @@ def test_linked_heads_look_the_same_drawn_together_and_one_by_one(thin, monkeypa
         assert found[2] == one_by_one[2]
     assert together[0][..., 3].max() > 0.5 and together[1].max() > 0.5
     assert np.abs(shadowed[0] - together[0]).max() > 0.1
+
+
+def test_heads_in_colors_of_their_own_are_drawn_together(thin, monkeypatch):
+    """Heads in random colors have the pixels of heads that are drawn one by one.
+
+    The looks are the same when the scene is read again.
+    """
+    link(thin, PLACES[:4])
+    shown = viewport_shading.ViewportShading(color=viewport_shading.HairColor("RANDOM"))
+    drawn = read(shown=shown)
+    assert [len(batch.indices) for batch in drawn.batches] == [4]
+    assert len({shading.tint for _strands, shading, *_ in drawn.hair}) == 4
+    monkeypatch.setattr(solid_shading.shading_cache, "_least", 1)
+    again = [read(shown=shown).hair for _turn in range(2)]
+    assert all(one[1] is other[1] for one, other in zip(*again, strict=True))
+    together = pictures(drawn, {})
+    monkeypatch.setattr(strand_batches, "groups_of", lambda keys: [[index] for index, _key in enumerate(keys)])
+    one_by_one = pictures(read(shown=shown), {})
+    np.testing.assert_array_equal(together[0], one_by_one[0])
+    assert np.ptp(together[0][together[0][..., 3] > 0.5], axis=0)[:3].min() > 0.1
 
 
 def test_surfaces_of_a_crowd_are_uploaded_and_triangulated_once(thin, monkeypatch):
