@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Prepares guides: their segments in the frames of their roots, and the values that limit their weights.
+// Prepares guides: their segments in the frames of their roots, the values that limit their weights, and their roots.
 
 #include "strands/guide_interpolation.glsl"
 #include "strands/strip.glsl"
@@ -30,7 +30,7 @@ void main()
   vec3 bitangent;
   root_frame(normal, tangent, bitangent);
   int last = making.point_count - 1;
-  ivec2 first = strand_texel(guide, 0, making.point_count + 1, making.row_segments);
+  ivec2 first = strand_texel(guide, 0, making.point_count + 2, making.row_segments);
   vec3 root = guide_point(guide, 0);
   vec3 before = root;
   vec3 lower = vec3(0.0);
@@ -53,4 +53,5 @@ void main()
   tip = unit_or_zero(vec3(dot(tangent, tip), dot(bitangent, tip), dot(normal, tip)));
   imageStore(segments, first + ivec2(last, 0), vec4(lower, log(clamp(total, 1e-30, 1e30))));
   imageStore(segments, first + ivec2(last + 1, 0), vec4(tip, 0.0));
+  imageStore(segments, first + ivec2(last + 2, 0), vec4(root, 0.0));
 }

@@ -32,11 +32,13 @@ void main()
   vec3 first_tip = vec3(0.0);
   float first_length = 0.0;
   float total = 0.0;
+  vec3 mean_normal = vec3(0.0);
+  float mean_way = 0.0;
   for (int slot = 0; slot < SLOTS; slot++) {
     vec4 pair = texelFetch(bindings, bound + ivec2(2 + slot / 2, 0), 0);
     vec2 weighed = (slot % 2 == 0) ? pair.xy : pair.zw;
     int index = int(weighed.x);
-    guide[slot] = strand_texel(index, 0, making.point_count + 1, making.row_segments);
+    guide[slot] = strand_texel(index, 0, making.point_count + 2, making.row_segments);
     int row = index / making.row_normals;
     vec3 guide_normal = texelFetch(guide_normals, ivec2(index - row * making.row_normals, row), 0).xyz;
     turn[slot] = frame_turn(guide_normal, tangent, bitangent, normal);
@@ -55,6 +57,9 @@ void main()
       share[slot] *= limited_part(facing, abs(shape.w - first_length), making.limits);
     }
     total += share[slot];
+    mean_normal += share[slot] * guide_normal;
+    vec3 guide_root = texelFetch(segments, guide[slot] + ivec2(making.point_count + 1, 0), 0).xyz;
+    mean_way += share[slot] * length(guide_root - root);
   }
   // No strand is longer than its guides' mean, except by rounding.
   float range = 0.0;
@@ -62,6 +67,12 @@ void main()
     share[slot] /= total;
     turn[slot] *= share[slot];
     range += share[slot] * exp(log_length[slot]);
+  }
+  vec3 limited = limited_normal(normal, mean_normal / total, SPREAD * (mean_way / total) / range);
+  if (limited != normal) {
+    tangent = carried_along(tangent, normal, limited);
+    bitangent = carried_along(bitangent, normal, limited);
+    normal = limited;
   }
   range *= 1.001 * making.axes_scale;
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from .guide_weights import Candidates, GuideWeights, Limits
 
+# Largest movement of a strand's points by its turn against its guides (interpolation.py), in mean distances to its guides.
+SPREAD = 0.25
+
 
 @dataclass(frozen=True)
 class HairBinding:

@@ -9,12 +9,14 @@
 //   int strand                              index of the strand
 //   vec3 root                               its root [m]
 //   vec3 tangent, bitangent, normal         its frame
+//   array_t<float> guide_rows               (G, 8) normal and position of each guide's root, its length, and a zero
 //   array_t<float> offsets                  (G, groups, 4 * SEGMENTS) segments of guides in the frames of their roots
 //                                           [m], 0 past the tip. In each group: on a CPU all x, all y, all z, then all
 //                                           lengths; on a GPU x, y, z and length of each segment
 //   array_t<int> indices                    (S, K) guides of each strand
 //   array_t<float> weights                  (S, K) their weights, zero in unused slots
 //   array_t<vec2> turns                     (S, K) cosine and sine of the angle from a guide's frame to the strand's
+//   float spread                            limit of a strand's turn against its guides (interpolation.py)
 //   float keep_length                       0 to 1: blend to segments with the guides' mean length
 //   array_t<vec3> out_points                (S, P) [m]
 //
@@ -27,6 +29,7 @@
 {
 #include "lanes.h"
 #include "vectors.h"
+#include "guide_rows.h"
 #include "guide_sum.strand"
 const int point_count = out_points.shape[1];
 const int slot_count = indices.shape[1];
@@ -52,6 +55,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
 };
 
 #if defined(__CUDA_ARCH__)
+  const auto sum_of = [](lanes value) { return value; };
   const int lane = threadIdx.x % SEGMENTS;
   // The threads of this strand, as bits of the warp.
   const unsigned team = ((1u << SEGMENTS) - 1u) << (threadIdx.x % 32 / SEGMENTS * SEGMENTS);
@@ -82,6 +86,12 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
     }
   };
 #else
+  // The sum of all lanes, in each lane.
+  const auto sum_of = [](lanes v) ALWAYS_INLINE {
+    v += __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3);
+    v += __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5);
+    return v + __builtin_shufflevector(v, v, 1, 0, 3, 2, 5, 4, 7, 6);
+  };
   const auto read_segments = [](const float* from) ALWAYS_INLINE {
     Segments found;
     __builtin_memcpy(&found, from, sizeof(Segments));
@@ -127,6 +137,41 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   };
 #endif
 
+// The frame, which turns at most by the spread against the guides.
+lanes mean_x = 0.0f, mean_y = 0.0f, mean_z = 0.0f, mean_length = 0.0f, mean_way = 0.0f;
+for (int first = 0; first < slot_count; first += LANES) {
+  const int count = slot_count - first < LANES ? slot_count - first : LANES;
+  ints its_guides = -1;
+  lanes share = 0.0f;
+  read_lanes(its_guides, indices.data + size_t(strand) * slot_count + first, count);
+  read_lanes(share, weights.data + size_t(strand) * slot_count + first, count);
+  lanes its[8];
+  read_columns(its, its_guides, guide_rows.data);
+  const auto weighed = [&](lanes value) { return share > 0.0f ? share * value : lanes(0.0f); };
+  const vector way = {its[3] - root[0], its[4] - root[1], its[5] - root[2]};
+  mean_x += weighed(its[0]);
+  mean_y += weighed(its[1]);
+  mean_z += weighed(its[2]);
+  mean_length += weighed(its[6]);
+  mean_way += weighed(sqrt_of(dot(way, way)));
+}
+const vector own = {normal[0], normal[1], normal[2]};
+const vector limited = limited_normal(
+    own, {sum_of(mean_x), sum_of(mean_y), sum_of(mean_z)}, spread * sum_of(mean_way) / sum_of(mean_length));
+auto along_tangent = tangent;
+auto along_bitangent = bitangent;
+auto along_normal = normal;
+const auto put = [&](auto& to, const vector& from) {
+  to[0] = get_lane(from.x, 0);
+  to[1] = get_lane(from.y, 0);
+  to[2] = get_lane(from.z, 0);
+};
+put(along_normal, limited);
+if (along_normal[0] != normal[0] || along_normal[1] != normal[1] || along_normal[2] != normal[2]) {
+  put(along_tangent, carried_along({tangent[0], tangent[1], tangent[2]}, own, limited));
+  put(along_bitangent, carried_along({bitangent[0], bitangent[1], bitangent[2]}, own, limited));
+}
+
 float* row = reinterpret_cast<float*>(out_points.data) + size_t(strand) * point_count * 3;
 float last_x = root[0], last_y = root[1], last_z = root[2];
 row[0] = last_x;
@@ -140,9 +185,9 @@ for (int group = 0; group < group_count; ++group) {
   });
   // Out of the strand's frame.
   const lanes stretch = stretch_of(x, y, z, size, keep_length);
-  lanes along_x = stretch * (tangent[0] * x + bitangent[0] * y + normal[0] * z);
-  lanes along_y = stretch * (tangent[1] * x + bitangent[1] * y + normal[1] * z);
-  lanes along_z = stretch * (tangent[2] * x + bitangent[2] * y + normal[2] * z);
+  lanes along_x = stretch * (along_tangent[0] * x + along_bitangent[0] * y + along_normal[0] * z);
+  lanes along_y = stretch * (along_tangent[1] * x + along_bitangent[1] * y + along_normal[1] * z);
+  lanes along_z = stretch * (along_tangent[2] * x + along_bitangent[2] * y + along_normal[2] * z);
   add_up(along_x, last_x);
   add_up(along_y, last_y);
   add_up(along_z, last_z);

@@ -15,6 +15,13 @@ normals are. With a frame F (tangent, bitangent, normal) at either root it is F_
 about the normal. So guides are transformed to their frames once, a neighbor costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
 
+A strand beyond its outermost guides, or on a rough surface, has another normal n than its guides. Long hair would turn
+with it: 5° move the tips of hair of 38 cm by 3 cm. So the frame of a strand turns against its guides only as far as no
+point moves by more than SPREAD of the mean distance of its guides: it has n, moved toward the mean normal of its guides
+until the chord between them is SPREAD (Σ w_j |g_j - q|) / (Σ w_j L_j), with guides' roots g_j and lengths L_j. Hair
+that is short beside the distance of its guides turns with the surface, and so does hair around edges and on thin sheets,
+where the normals are more than 60° apart (guide_sum.strand).
+
 interpolation.cpp computes eight segments of a strand at once, in vector registers of a processor (Clang's vectors,
 which Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums over all
 guides stay in registers, segments are added up to points, and a strand is written once. The equations are in
@@ -30,6 +37,7 @@ from ..kernels import native_code, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
 from .guide_weights import GuideWeights, frame
+from .hair_binding import SPREAD
 
 wp.set_module_options({"enable_backward": False})
 
@@ -67,11 +75,12 @@ def interpolate(
     group_count = -(-(point_count - 1) // SEGMENTS)
     on_cpu = wp.get_device(roots.device).is_cpu
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
+    guide_rows = wp.empty((guide_count, 8), dtype=float, device=roots.device)
     parallel.launch(
         _put_offsets,
         guide_count,
         inputs=[Rows(guide_points), Rows(guide_normals), *((1, SEGMENTS) if on_cpu else (4, 1))],
-        outputs=[offsets],
+        outputs=[offsets, guide_rows],
         device=roots.device,
         least_rows=1024,
     )
@@ -84,9 +93,11 @@ def interpolate(
             Rows(roots),
             Rows(normals),
             offsets,
+            guide_rows,
             Rows(guide_weights.indices),
             Rows(guide_weights.weights),
             Rows(guide_weights.turns),
+            SPREAD,
             keep_length,
             threads,
         ],
@@ -106,9 +117,11 @@ def _sum_guides(
     bitangent: wp.vec3,
     normal: wp.vec3,
     offsets: wp.array3d[float],
+    guide_rows: wp.array2d[float],
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
+    spread: float,
     keep_length: float,
     out_points: wp.array2d[wp.vec3],
 ): ...
@@ -119,9 +132,11 @@ def _put_strands(
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
     offsets: wp.array3d[float],
+    guide_rows: wp.array2d[float],
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
+    spread: float,
     keep_length: float,
     threads: int,  # per strand
     # outputs
@@ -137,9 +152,11 @@ def _put_strands(
         bitangent,
         normal,
         offsets,
+        guide_rows,
         indices,
         weights,
         turns,
+        spread,
         keep_length,
         out_points,
     )
@@ -163,10 +180,18 @@ def _put_offsets(
     part_stride: int,
     # outputs
     out_offsets: wp.array3d[float],
+    out_rows: wp.array2d[float],
 ):
     guide = wp.tid()
+    length = float(0.0)
     for group in range(out_offsets.shape[1]):
         for lane in range(wp.static(SEGMENTS)):
             offset = _framed_offset(guide_points, guide, 1 + wp.static(SEGMENTS) * group + lane, guide_normals[guide])
             for part in range(4):
                 out_offsets[guide, group, segment_stride * lane + part_stride * part] = offset[part]
+            length += offset[3]
+    for axis in range(3):
+        out_rows[guide, axis] = guide_normals[guide][axis]
+        out_rows[guide, 3 + axis] = guide_points[guide, 0][axis]
+    out_rows[guide, 6] = length
+    out_rows[guide, 7] = 0.0

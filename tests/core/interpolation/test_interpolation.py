@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from hair_addon.core.geometry.strands import offsets, segment_lengths
 from hair_addon.core.interpolation import interpolation
+from hair_addon.core.interpolation.hair_binding import SPREAD
 from tests.support.devices import DEVICE
 from tests.support.strands.finding import find_guides
 
@@ -33,6 +34,16 @@ def least_rotations(starts, end):
     sines = np.linalg.norm(axes, axis=1)
     angles = np.arctan2(sines, starts @ end)
     return Rotation.from_rotvec(axes * (angles / np.where(sines > 0.0, sines, 1.0))[:, None]).as_matrix()
+
+
+def limited_turn(root, normal, w, guides, guide_normals):
+    """Return the matrix (3, 3) that takes a strand's normal toward the mean normal of its guides."""
+    most = SPREAD * (w @ np.linalg.norm(guides[:, 0] - root, axis=1)) / (w @ segment_lengths(guides).sum(axis=1))
+    step = unit(w @ guide_normals) - normal
+    apart = np.linalg.norm(step)
+    past = np.clip(2.0 * apart - 1.0, 0.0, 1.0)
+    part = max(1.0 - most / apart, 0.0) * (1.0 - past**2 * (3.0 - 2.0 * past))
+    return least_rotations(normal[None], unit(normal + part * step))[0]
 
 
 @pytest.fixture
@@ -71,6 +82,7 @@ def test_strands_are_what_the_equations_say(scene, distance, keep_length):
     expected = np.empty((200, 21, 3))
     for strand, (q, normal, w) in enumerate(zip(scene["roots"], scene["normals"], weights, strict=True)):
         turned = np.einsum("jab,jib->jia", least_rotations(scene["guide_normals"], normal), guide_offsets)
+        turned = turned @ limited_turn(q, normal, w, guides, scene["guide_normals"]).T
         expected[strand, 0] = q
         for i in range(1, 21):  # Eq. 10
             mean = w @ turned[:, i]
@@ -145,6 +157,28 @@ def test_strands_stay_within_the_hull_of_their_guides(scene, rng):
     assert np.all((shapes @ directions.T).max(axis=0) <= (guide_shapes @ directions.T).max(axis=0) + 1e-5)
 
 
+@pytest.mark.parametrize("length", [0.4, 0.01])
+def test_long_hair_does_not_spread_beyond_its_guides(rng, length):
+    """Strands beyond the outermost guides, which hang, move from their guides by a quarter of the guides' distance.
+
+    Strands as short as the distance turn with the surface. Rotations to the mean of normals cancel in first order.
+    """
+    directions = unit(rng.normal(size=(900, 3)))
+    is_guide = directions[:, 0] < -0.3
+    guide_normals, normals = directions[is_guide], directions[~is_guide]
+    hanging = np.linspace(0.0, length, 9)[:, None] * [0.0, 0.0, -1.0]
+    guides, roots = 0.1 * guide_normals[:, None] + hanging, 0.1 * normals
+    weights = weights_of(roots, guides[:, 0], None, 8)
+    chords = np.linalg.norm(unit(weights @ guide_normals) - normals, axis=1)
+    is_beside = chords < 0.45
+    strands = strands_between(roots, normals, guides, guide_normals) - roots[:, None]
+    grown = np.linalg.norm(strands[:, -1] - hanging[-1], axis=1)
+    distance = (weights * np.linalg.norm(roots[:, None] - guides[:, 0], axis=2)).sum(axis=1)
+    least = np.minimum(chords, SPREAD * distance / length) * length
+    assert np.all(grown[is_beside] <= least[is_beside] + 0.02 * length)
+    assert np.mean((least < 0.5 * chords * length)[is_beside]) == pytest.approx(float(length > 0.1), abs=0.2)
+
+
 def test_the_order_of_strands_does_not_matter(scene, rng):
     order = rng.permutation(200)
     shuffled = scene | {"roots": scene["roots"][order], "normals": scene["normals"][order]}
@@ -184,7 +218,9 @@ def test_opposite_normals_keep_the_length():
 
 @pytest.mark.parametrize("point_count", [1, 2, 6, 7, 40, 41, 42, 81])
 def test_any_number_of_points(scene, point_count):
-    """A strand's points do not depend on how many follow."""
+    """A strand's points do not depend on how many follow, while strands are short beside the distance of guides."""
+    roots = scene["guides"][:, :1]
+    scene["guides"] = roots + 0.002 * (scene["guides"] - roots)
     guides = np.concatenate([scene["guides"]] * 4, axis=1)[:, :point_count]
     expected = strands_between(**scene)[:, :21]
     count = min(point_count, 21)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import gpu
 import numpy as np
 
-from ....core.interpolation.hair_binding import HairBinding
+from ....core.interpolation.hair_binding import SPREAD, HairBinding
 from ....core.kernels.checks import require_count, require_indices
 from ..programs import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
@@ -25,7 +25,7 @@ class StrandMaker:
 
     bindings: gpu.types.GPUTexture  # for each strand its root, its normal, and its guides with weights
     guide_normals: gpu.types.GPUTexture
-    segments: gpu.types.GPUTexture  # of guides, in their frames; followed by the limits of their weights
+    segments: gpu.types.GPUTexture  # of guides, in their frames; then the limits of their weights, and their roots
     changes: StrandChanges | None  # None if strands are made for styles
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
@@ -154,7 +154,7 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
     _segments_program(), _strands_program(slot_count, is_plain)
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
     normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
-    segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
+    segments, record["row_segments"] = empty_rows(guide_count, point_count + 2)
     changes = None if is_plain else new_changes(strand_count, point_count)
     block = uniforms.uniform_buffer(record)
     return StrandMaker(bindings_texture, normals_texture, segments, changes, record, block, slot_count)
@@ -199,6 +199,7 @@ def _strands_program(slot_count, is_plain):
     """Return the compute program that makes strands of `slot_count` guides each; is_plain: as for `new_maker`."""
     info = _declared(("bindings", "guide_normals", "segments"))
     info.define("SLOTS", str(slot_count))
+    info.define("SPREAD", repr(SPREAD))
     for name in ("first_strand", "some_count"):
         info.push_constant("INT", name)
     if not is_plain:
