@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .guide_weights import Candidates, GuideWeights, Limits
 
-# Largest movement of a strand's points by its turn against its guides (interpolation.py), in mean distances to its guides.
+# Largest movement of a strand's points by its turn against its guides, in mean distances of its guides.
 SPREAD = 0.25
 
 
