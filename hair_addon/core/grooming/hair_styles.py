@@ -86,16 +86,22 @@ def bind_styles(
     if cut is None and is_plain(guides, settings, styles):
         return None
     inputs = Inputs() if inputs is None else inputs
-    found = styling.varied_numbers.varied_trees(styles, inputs.numbers, binding)
-    varied = {place: tree.tree for place, tree in found.items()}
-    trees.search([tree for tree, _level in styling.program.tree_levels(styles, varied)], progress)
+    varied = styling.varied_numbers.varied_trees(styles, inputs.numbers, binding)
+    own = {place: found.tree for place, found in varied.items()}
+    trees.search([tree for tree, _level in styling.program.tree_levels(styles, own)], progress)
     if cut is not None or settings.strand_length != 1.0:
         mask = CutMask(settings.strand_length) if cut is None else cut
         styles = (styling.program.CUT, *styles)
-        numbers = {(place + 1, name): found for (place, name), found in inputs.numbers.items()}
-        inputs = replace(inputs, masks={**inputs.masks, styling.program.CUT_KEY: mask}, numbers=numbers)
+        masks = {**inputs.masks, styling.program.CUT_KEY: mask}
+        inputs = replace(inputs, masks=masks, numbers=_below(inputs.numbers), courses=_below(inputs.courses))
+        varied = {place + 1: found for place, found in varied.items()}
     axes = np.eye(4) if axes is None else axes
-    return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count)
+    return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count, varied)
+
+
+def _below(of_styles):
+    """Return {(index of a style, name): value} for styles below one more style."""
+    return {(place + 1, name): value for (place, name), value in of_styles.items()}
 
 
 def is_plain(guides: Strands, settings: HairSettings, styles: Sequence[StyleSettings]) -> bool:

@@ -5,9 +5,10 @@ Center strands of clumps come first, level by level: each is styled by the steps
 Then one launch runs the whole program on all strands.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -222,14 +223,15 @@ def bind(
     trees: ClumpTrees,
     axes: np.ndarray,
     point_count: int,
+    varied: Mapping[int, varied_numbers.VariedTree] = MappingProxyType({}),
 ) -> Styling:
     """Bind styles to strands; sites that `trees` does not contain yet are placed and bound.
 
     binding and guides of the strands; inputs: `Inputs` of the styles; axes: (4, 4), from the coordinates of strands to
-    the surface's own, without scale; point_count: points per strand.
+    the surface's own, without scale; point_count: points per strand; varied: from
+    `varied_numbers.varied_trees`.
     """
     device = binding.positions.device
-    varied = varied_numbers.varied_trees(styles, inputs.numbers, binding)
     levels = programs.tree_levels(styles, {place: found.tree for place, found in varied.items()})
     choices = [varied.get(place) for place, style in enumerate(styles) for _level in _levels_of(style)]
     keys = programs.mask_keys(styles)

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
+from hair_addon.core.grooming import hair_styles
 from hair_addon.core.styling import bend, braid, clump, courses, curl, frizz, kinds, lean, smooth
 from hair_addon.core.styling.masks import Inputs
 from tests.support.strands.styled import head
+
+CURL = curl.Settings()
 
 # Style, other styles above it.
 CASES = {
@@ -55,6 +58,25 @@ def test_a_late_course_changes_the_outer_part_alone(hair, name, setting):
     moved = np.linalg.norm(found - plain, axis=-1)
     assert moved[:, -1].mean() > 1e-4
     np.testing.assert_array_equal(moved[:, 0], 0.0)
+
+
+def test_cut_strands_have_the_course_of_their_own_style(hair):
+    """Strands that are cut before the styles keep the courses of their styles, which then have another place."""
+    course = {(0, "radius"): np.full(2, 0.5)}
+    found, wanted = (
+        hair_styles.bind_styles(
+            hair.binding,
+            hair.guides,
+            replace(hair.settings, strand_length=length),
+            [CURL],
+            hair.trees,
+            Inputs(courses=course),
+        ).program
+        for length in (0.5, 1.0)
+    )
+    assert len(found) == 2 and found.before(1).choices[0, -1] == 0
+    np.testing.assert_array_equal(found.choices[1, -1:], wanted.choices[0, -1:])
+    assert found.choices[1, -1] > 0
 
 
 @pytest.mark.parametrize(("name", "setting"), [pair for pair in SETTINGS if pair[1] not in ("pitch", "wavelength")])
