@@ -2,6 +2,7 @@
 """Detection of outdated guides and hair: keys of roots, guides, masks and partings."""
 
 import hashlib
+from collections.abc import Mapping
 
 import numpy as np
 from bpy.types import Curves, Depsgraph
@@ -9,10 +10,11 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.grooming import groom
 from ...core.params import Settings
+from ...core.styling import program
 from ..data import masks, scene
 from ..data.strands import curves, drawn_lines, partings
 from ..host.notices import text_of
-from ..settings import setting_properties
+from ..settings import setting_properties, style_items
 
 _HALF = 16  # digits of a root key that encode settings
 
@@ -57,6 +59,20 @@ def keep_roots(target: Curves, depsgraph: Depsgraph, matching: np.ndarray) -> No
     key = root_key(settings, density, image)
     if key[:_HALF] == state.root_key[:_HALF]:
         state.root_key = key
+
+
+def images_key(values: Mapping[str, np.ndarray]) -> str:
+    """Return the key of images that mask styles, {name: (H, W) float32}; empty without images."""
+    parts = [f"{name} {each.shape} {geometry.fingerprint.fingerprint(each)}" for name, each in sorted(values.items())]
+    return _half_key("\n".join(parts).encode()) if parts else ""
+
+
+def has_other_style_images(hair: Curves) -> bool:
+    """Whether images that mask styles were painted or replaced since hair was written. Raises `HairError`."""
+    keys = program.mask_keys(style_items.styles_of(hair.vellus))
+    read = {image: scene.read_image(image, may_be_black=True) for _name, image, _is_inverted in keys}
+    values = {image: found for image, found in read.items() if found is not None}
+    return hair.vellus.style_images_key != images_key(values)
 
 
 def guides_digest(guide_curves: Curves | None) -> str:

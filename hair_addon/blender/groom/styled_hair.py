@@ -18,13 +18,13 @@ from ...core.long_work import Progress, no_progress
 from ...core.styling import program
 from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
-from ...core.styling.masks import Inputs
+from ...core.styling.masks import Inputs, Mask
 from ..data import surface_space
 from ..data.maps.sources import Source
 from ..data.strands import style_inputs
 from ..data.surfaces import Surface
 from ..settings import setting_properties
-from . import strand_lengths, varied_styles
+from . import staleness, strand_lengths, varied_styles
 
 if TYPE_CHECKING:
     from ...core.styling.stack import Styling
@@ -58,6 +58,16 @@ class ReadStyles:
         """Whether the maps of `read_maps` vary strands."""
         is_same = length is None if self.length is None else self.length.is_same(length)
         return is_same and self.map_status == map_status and varied_styles.are_same(self.numbers, numbers)
+
+    @cached_property
+    def images_key(self) -> str:
+        """`staleness.images_key` of the images that mask the styles."""
+        values = {}
+        for key in program.mask_keys(self.styles):
+            mask = self.inputs.masks[key]
+            if isinstance(mask, Mask) and mask.texture is not None:
+                values[key[1]] = mask.texture.values
+        return staleness.images_key(values)
 
     @property
     def _active(self):

@@ -105,6 +105,7 @@ def write_hair(target: Curves) -> None:
         kept_shapes.forget(target)
         kept_widths.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
+        state.style_images_key = bound.styles.read.images_key
         binding, radii = bound.binding, bound.radii
         normals = binding.normals.numpy()
         curves.make_strands(

@@ -175,12 +175,14 @@ def follow_images(target, depsgraph):
     """
     state = target.vellus
     masking = text_of(state.guides if state.kind == "GUIDES" else state.hair, "density_image")
-    if not masking or curves.grown_on(target).mode == "TEXTURE_PAINT":
+    if curves.grown_on(target).mode == "TEXTURE_PAINT":
         state.is_stale = True
         return
-    is_painted = state.status != "" or images_of(target) != {masking}
+    bound = bindings.of(target)
+    is_painted = state.status not in ("", "" if bound is None else bound.map_status)
     with _refusal_as_status(target):
-        if staleness.has_other_mask(target, depsgraph):
+        is_painted = is_painted or (state.kind == "HAIR" and staleness.has_other_style_images(target))
+        if masking and staleness.has_other_mask(target, depsgraph):
             is_painted = True
             if state.kind == "HAIR":
                 bindings.invalidate(target)
@@ -221,8 +223,16 @@ def follow_wet_places(surfaces, images):
         for item in hair.vellus.styles:
             mask, image = style_items.masks_of(item) if item.kind == "WET" else ("", "")
             is_painted = (mask or image) and guides.surface in surfaces
-            if is_painted or (image and any(text_of(painted, "name") == image for painted in images)):
+            is_reported = image and any(text_of(painted, "name") == image for painted in images)
+            if is_painted or (is_reported and _has_other_style_images(hair)):
                 guides.vellus.is_dynamics_stale = True
+
+
+def _has_other_style_images(hair):
+    try:
+        return staleness.has_other_style_images(hair)
+    except HairError:  # the hair's status says so
+        return True
 
 
 def follow_ramps():

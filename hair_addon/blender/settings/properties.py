@@ -316,6 +316,9 @@ class VellusCurves(bpy.types.PropertyGroup):
         description="Faces before subdivision that the stored roots refer to", options={"HIDDEN"}
     )
     root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
+    style_images_key: bpy.props.StringProperty(
+        description="Fingerprint of the images that mask styles", options={"HIDDEN"}
+    )
     fit_key: bpy.props.StringProperty(description="Inputs that sizes were fitted to", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
     flow_key: bpy.props.StringProperty(description="Flow lines that the guides were grown along", options={"HIDDEN"})

@@ -9,6 +9,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.groom import staleness
+from hair_addon.blender.live import stale_marks
 from hair_addon.core.grooming import groom
 from tests.support.reading import points, vertex_positions, write_points
 
@@ -255,3 +256,46 @@ def test_keys_of_roots_tell_settings_from_what_is_painted():
     assert staleness.root_key(settings, None) == "".join(
         hashlib.blake2b(data, digest_size=8).hexdigest() for data in (placing.encode(), b"")
     )
+
+
+@pytest.fixture
+def curls(masked, image):
+    """Return hair whose curls have a mask image, on a surface that was scaled since."""
+    hair = masked[1].data
+    api.add_style(hair, "CURL", radius=0.05, mask_image="Mask")
+    bpy.context.view_layer.update()
+    bpy.data.objects["Sphere"].scale = (-1.0, -1.0, -0.01)
+    bpy.context.view_layer.update()
+    return masked[1]
+
+
+def test_an_image_of_a_style_that_is_updated_unchanged_moves_no_strand(curls, image):
+    """An image that masks a style moves strands when it is painted, and none when it is updated unchanged."""
+    before = points(curls)
+    image.update_tag()
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(curls), before)
+    image.pixels.foreach_set(np.ones(32 * 32 * 4, np.float32))
+    image.update()
+    image.update_tag()
+    bpy.context.view_layer.update()
+    assert not np.array_equal(points(curls), before)
+
+
+def test_images_do_not_mark_hair_whose_status_is_about_maps(masked, image, monkeypatch):
+    """A status about a map without a source is no reason to regenerate hair when an image is updated."""
+    guides, hair = masked
+    set_setting(guides.data.vellus.guides, "density_group", "")
+    set_setting(hair.data.vellus.hair, "density_image", "Mask")
+    api.set_map(hair, "strands.thickness", "group:lost")
+    bpy.context.view_layer.update()
+    assert "lost" in hair.data.vellus.status
+    stale, follow = [], stale_marks.follow_images
+    monkeypatch.setattr(
+        stale_marks,
+        "follow_images",
+        lambda target, depsgraph: (follow(target, depsgraph), stale.append(target.vellus.is_stale)),
+    )
+    image.update_tag()
+    bpy.context.view_layer.update()
+    assert stale == [False]

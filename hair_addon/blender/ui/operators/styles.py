@@ -8,7 +8,7 @@ import bpy
 from ....core.files import style_presets
 from ....core.styling.kinds import DESCRIPTIONS, OFFERS
 from ....core.styling.program import tree_settings
-from ...data.strands.curves import require_editable
+from ...data.strands.curves import grown_on, require_editable
 from ...groom.selection import hair_of
 from ...groom.styles import hair_styles, painted_density, painted_masks
 from ...groom.transfer import groom_settings
@@ -163,7 +163,7 @@ class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
             return True
         cls.poll_message_set("Select hair with styles, on a surface, in Object Mode.")
         hair = hair_of(context.object)
-        has_place = context.mode == "OBJECT" and hair is not None and hair.surface is not None
+        has_place = context.mode == "OBJECT" and hair is not None and grown_on(hair) is not None
         return has_place and active_style_of(context) is not None
 
     def change(self, context):
@@ -185,7 +185,7 @@ class VELLUS_OT_paint_density(HairOperator, bpy.types.Operator):
             return True
         cls.poll_message_set("Select hair on a surface, in Object Mode.")
         hair = hair_of(context.object)
-        return context.mode == "OBJECT" and hair is not None and hair.surface is not None
+        return context.mode == "OBJECT" and hair is not None and grown_on(hair) is not None
 
     def change(self, context):
         if painted_masks.is_painting(context.object):

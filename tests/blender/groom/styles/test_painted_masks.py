@@ -117,6 +117,14 @@ def test_roots_wait_where_the_guides_are_on_another_surface(styled):
     assert len(styled.data.curves) == count // 2
 
 
+def test_masks_are_painted_on_the_surface_of_the_guides(styled):
+    """Hair without a surface of its own is painted on the surface of its guides."""
+    styled.data.surface = None
+    for paint in (bpy.ops.vellus.paint_style_mask, bpy.ops.vellus.paint_density):
+        assert paint() == {"FINISHED"} and sphere().mode == "WEIGHT_PAINT"
+        assert paint() == {"FINISHED"} and sphere().mode == "OBJECT"
+
+
 def test_a_group_that_is_there_is_painted_and_a_lost_one_is_made(styled):
     active_group().mask = "top"
     bpy.context.view_layer.update()
