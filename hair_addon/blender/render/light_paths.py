@@ -63,8 +63,11 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     sums, taken = light_paths.gather.gather(grid, surroundings_of(drawn), seen, starting, seed, most, tracing)
     if not taken:
         return drawn
-    means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
-    return lit_by(drawn, grid, [light_grid.upload(of_hair) for of_hair in means])
+
+    def texture_of(of_hair):
+        return light_grid.upload(light_paths.voxel_means.shares(of_hair, taken, grid.origin))
+
+    return lit_by(drawn, grid, light_paths.gather.of_each(texture_of, sums))
 
 
 def obstacle(drawn):
@@ -153,6 +156,7 @@ def _strands_of(strands, shading, to_world, first):
         np.stack(roughness)[is_wettest, np.arange(count)],
         first + is_wettest,
         to_world,
+        (id(strands), id(shading)),
     )
 
 

@@ -465,9 +465,11 @@ class LiveLight:
         new_part = 1.0 if is_spent or self._turned is None else self._new_part()
         self._is_done = part == 1.0 and (is_spent or (is_known and new_part == 1.0))
         if new_part < 1.0:
-            both = zip(self._turned, means, strict=True)
-            means = [before + np.float32(new_part) * (now - before) for before, now in both]
-        self._textures, self._grid = tuple(light_grid.upload(of_hair) for of_hair in means), self._paths.grid
+            before = {id(now): then for then, now in zip(self._turned, means, strict=True)}
+            means = paths.gather.of_each(
+                lambda now: before[id(now)] + np.float32(new_part) * (now - before[id(now)]), means
+            )
+        self._textures, self._grid = tuple(paths.gather.of_each(light_grid.upload, means)), self._paths.grid
         self._means = means
 
     def _new_part(self):
@@ -508,4 +510,4 @@ def _grid_of(systems, fibres, device):
 
 def _are_alike(grid, other):
     """Whether sums of a grid can be added to those of another."""
-    return grid.device == other.device and len(grid.thinned) == len(other.thinned)
+    return grid.device == other.device and grid.sums_of_systems == other.sums_of_systems

@@ -7,6 +7,9 @@ scattering, with sharp shadows. From these three sums `voxel_means` computes how
 that the mean light of the voxel is that of the paths.
 """
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import numpy as np
 import warp as wp
 
@@ -219,7 +222,7 @@ class PathSums:
     def shares(
         self, former: "PathSums | None" = None, weight: float = 0.0, shift: np.ndarray | float = 0.0
     ) -> list[np.ndarray]:
-        """Return `voxel_means.shares` of each hair system.
+        """Return `voxel_means.shares` of each hair system: the same object for linked hair.
 
         former: earlier sums on this device with the same number of systems, which are added with a weight; shift: (3,)
         motion of the hair since then [m].
@@ -230,7 +233,14 @@ class PathSums:
             sums.carry(self._sums, 1.0, 0.0)
             sums.carry(former._sums, weight, shift)
         count = max(int(taken), 1)
-        return [voxel_means.shares(of_hair, count, self.grid.origin) for of_hair in sums.of_systems()]
+        return of_each(lambda of_hair: voxel_means.shares(of_hair, count, self.grid.origin), sums.of_systems())
+
+
+def of_each(make: Callable[[Any], Any], values: Sequence[Any]) -> list[Any]:
+    """Return make(value) of each value, computed once for the same object, as linked hair has common sums."""
+    made = {id(value): value for value in values}
+    made = {key: make(value) for key, value in made.items()}
+    return [made[id(value)] for value in values]
 
 
 def _sight_of(grid, surroundings):

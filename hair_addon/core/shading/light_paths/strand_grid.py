@@ -5,7 +5,7 @@ Each cell lists all segments that touch it with their width, so a ray finds the 
 many strands are thinned out: the remaining strands are wider and block as much light.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,7 +37,8 @@ class Strands:
 
     absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) if all strands are equal, at root
     and tip; gradient: (P,) fraction of the tip's absorption at each point; fibre: (S,) index of each strand's settings
-    among the settings given to `build`.
+    among the settings given to `build`; kind: equal for systems with the same strands and look, whose light is summed
+    together, None: the light is summed by itself.
     """
 
     points: np.ndarray  # (S, P, 3)
@@ -47,6 +48,7 @@ class Strands:
     roughness: np.ndarray  # (S,) longitudinal, in [0, 1]
     fibre: np.ndarray  # (S,)
     to_world: np.ndarray = field(default_factory=lambda: np.eye(4))  # (4, 4) of points, to [m]
+    kind: Hashable | None = None
 
 
 @dataclass(frozen=True)
@@ -75,9 +77,10 @@ class StrandGrid:
     strands: wp.array[int]  # (N,): the strand of each point
     roughness: wp.array[float]  # (S,)
     fibres: wp.array[int]  # (S,): rows of `fibre_rows`
-    systems: wp.array[int]  # (S,): the hair system of each strand
+    sums: wp.array[int]  # (S,): the index of the sums that the light of each strand is added to
     fibre_rows: wp.array2d[float]  # (F, 5): ior, azimuthal scale, tilt, shift of TRT in tilts, coat
     thinned: tuple[Thinned, ...]  # of each system
+    sums_of_systems: tuple[int, ...]  # the index of the sums of each system: the same for linked hair
 
     @property
     def origin(self) -> tuple[int, int, int]:
@@ -123,6 +126,7 @@ def build(
     ]
     firsts = np.cumsum([0, *(count * len(at) for count, (_stride, at) in zip(counts, chosen, strict=True))]).tolist()
     thinned = [Thinned(stride, len(at), first) for (stride, at), first in zip(chosen, firsts, strict=False)]
+    sums_of_systems = _sums_of(systems)
     with wp.ScopedDevice(device):
         device = wp.get_device()
         arrays = [wp.empty(firsts[-1], dtype=kind) for kind in (wp.vec3, float, wp.vec3, int)]
@@ -148,10 +152,18 @@ def build(
             strand_of_points,
             wp.array(roughness.astype(np.float32), dtype=float),
             wp.array(fibre.astype(np.int32), dtype=int),
-            wp.array(np.repeat(np.arange(len(counts), dtype=np.int32), counts), dtype=int),
+            wp.array(np.repeat(np.array(sums_of_systems, np.int32), counts), dtype=int),
             wp.array(np.array([_fibre_row(settings) for settings in fibres], np.float32).reshape(-1, 5), dtype=float),
             tuple(thinned),
+            sums_of_systems,
         )
+
+
+def _sums_of(systems):
+    """Return the index of the sums of each system."""
+    kinds = [(index, None) if strands.kind is None else strands.kind for index, strands in enumerate(systems)]
+    indices = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
+    return tuple(indices[kind] for kind in kinds)
 
 
 def has_area(systems: Sequence[Strands]) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths and samples by voxel and hair system, on the device of a grid.
+"""Sums over paths and samples by voxel and hair system, on the device of a grid. Linked hair has common sums.
 
 The same paths give the same bits in any order: on a GPU integers are added, scaled so that the sum of all values fits
 62 bits even if all equal the largest.
@@ -22,12 +22,12 @@ _LARGEST_SUM = 4.0e18  # limit of integers, below 2^62
 
 @wp.struct
 class _Places:
-    """The sum that each of N values is added to: the voxel of its place and the hair system of its segment."""
+    """The sum that each of N values is added to: the voxel of its place, for the hair of its segment."""
 
     places: wp.array[wp.vec3]
     segments: wp.array[int]
     strands: wp.array[int]
-    systems: wp.array[int]
+    sums: wp.array[int]
     corner: wp.vec3
     voxel: float
     shape: wp.vec3i
@@ -37,7 +37,7 @@ class _Places:
 def _row_of(at: _Places, index: int):
     cell = voxel_at(at.places[index], at.corner, at.voxel, at.shape)
     row = (cell[2] * at.shape[1] + cell[1]) * at.shape[0] + cell[0]
-    return at.systems[at.strands[at.segments[index]]] * (at.shape[0] * at.shape[1] * at.shape[2]) + row
+    return at.sums[at.strands[at.segments[index]]] * (at.shape[0] * at.shape[1] * at.shape[2]) + row
 
 
 @wp.kernel
@@ -139,31 +139,32 @@ def _scale_sums(weight: wp.float64, out_sums: wp.array2d[wp.float64]):
 
 
 class VoxelSums:
-    """(systems, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
+    """(different hair, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
 
     def __init__(self, grid: StrandGrid) -> None:
         self.grid = grid
         self._voxels = grid.shape[::-1]
-        rows = len(grid.thinned) * int(np.prod(self._voxels))
+        rows = (max(grid.sums_of_systems) + 1) * int(np.prod(self._voxels))
         self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """Return the sums (Z, Y, X, 12) of each hair system."""
+        """Return the sums (Z, Y, X, 12) of each hair system: the same object for linked hair."""
         count = int(np.prod(self._voxels))
         firsts = range(0, len(self._sums), count)
-        return [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
+        found = [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
+        return [found[index] for index in self.grid.sums_of_systems]
 
     def scale(self, weight: float) -> None:
         """Multiply all sums by a weight."""
         kernel_cache.launch(_scale_sums, self._sums.shape, [wp.float64(weight)], [self._sums], self._sums.device)
 
     def carry(self, before: "VoxelSums", weight: float, shift: np.ndarray | float) -> None:
-        """Add the sums of another grid on this device with the same number of systems, multiplied by a weight.
+        """Add the sums of another grid on this device with as many different hair systems, multiplied by a weight.
 
         shift: (3,) offset of the other grid's voxels [m]. Voxels outside the other grid do not change.
         """
         own, other = self.grid, before.grid
-        require_count("systems of hair", len(other.thinned), len(own.thinned))
+        require_count("sums of hair", len(set(other.sums_of_systems)), len(set(own.sums_of_systems)))
         size = (own.voxel / other.voxel) ** 3
         corner, shifted = own.corner.tolist(), (other.corner + shift).tolist()
         given = [before._sums, wp.vec3i(*other.shape), wp.vec3(*shifted), other.voxel]
@@ -193,7 +194,7 @@ class VoxelSums:
 
     def _places(self, places, segments):
         grid, at = self.grid, _Places()
-        at.places, at.segments, at.strands, at.systems = places, segments, grid.strands, grid.systems
+        at.places, at.segments, at.strands, at.sums = places, segments, grid.strands, grid.sums
         at.corner, at.voxel, at.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
         return at
 

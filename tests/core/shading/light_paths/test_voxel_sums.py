@@ -19,7 +19,7 @@ def on_the_processor():
         yield
 
 
-def two_systems(rng):
+def two_systems(rng, kinds=(None, None)):
     """Return a grid of two hairs of 60 and 90 strands."""
     settings = lookup_tables.Settings(mode="energy")
     systems = [
@@ -30,8 +30,9 @@ def two_systems(rng):
             np.zeros(4),
             np.full(count, 0.3),
             np.zeros(count, int),
+            kind=kind,
         )
-        for count in (60, 90)
+        for count, kind in zip((60, 90), kinds, strict=True)
     ]
     return strand_grid.build(systems, [settings], voxel_count=300)
 
@@ -70,6 +71,19 @@ def test_values_are_added_to_their_hair_and_voxel(rng, monkeypatch, way):
         np.testing.assert_array_equal(turned, sums)
     else:
         np.testing.assert_allclose(turned, sums, rtol=1e-12)
+
+
+def test_linked_hair_has_common_sums(rng):
+    """The sums of two hairs of the same kind are those of both hairs, added."""
+    state = rng.bit_generator.state
+    grid = two_systems(rng)
+    rng.bit_generator.state = state
+    linked = two_systems(rng, ("one", "one"))
+    given = samples_of(rng, grid, 2000)
+    apart, together = added(grid, *given, 6), added(linked, *given, 6)
+    assert apart.any(axis=(1, 2, 3, 4)).all()
+    np.testing.assert_allclose(together, np.repeat(apart.sum(axis=0, keepdims=True), 2, axis=0), rtol=1e-10)
+    assert len({id(sums) for sums in voxel_sums.VoxelSums(linked).of_systems()}) == 1
 
 
 def test_other_counts_are_refused(rng):
