@@ -11,6 +11,7 @@ from ..api.blender_access import NO_BLENDER
 from ..core.errors import HairError
 from ..core.long_work import Stopped
 from . import (
+    background,
     cards,
     console,
     export,
@@ -18,7 +19,6 @@ from . import (
     import_mesh,
     info,
     interruption,
-    panorama,
     paths,
     render,
     settings,
@@ -29,7 +29,19 @@ from . import (
 )
 from .options import Parser
 
-_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings, import_mesh, panorama)
+_VERBS = (
+    groom,
+    tables,
+    transfer,
+    simulate,
+    render,
+    export,
+    cards,
+    tubes,
+    info,
+    settings,
+    import_mesh,
+)
 
 
 def main(arguments, program):

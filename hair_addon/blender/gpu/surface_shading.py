@@ -7,11 +7,13 @@ import gpu
 import numpy as np
 
 from ...core.shading.tables import surface_albedo
+from ..data.pictures import surface_bakes
 from ..host.caches import Cache
 from . import drawing, windows
 from .programs import scene_programs, surface_programs, uniforms
 
 texture_cache = Cache()  # textures shared by all surfaces
+baked_cache = Cache(capacity=64)  # `BakedPicture` → texture
 
 
 def shade(surface, parts, first_triangle, view, lights, samplers, buffer, picture, has_over):
@@ -87,13 +89,21 @@ def _texture(image_map):
     if image_map is None:
         return None
     try:
-        texture = gpu.texture.from_image(image_map.image)
+        is_baked = isinstance(image_map.image, surface_bakes.BakedPicture)
+        texture = _baked_texture(image_map.image) if is_baked else gpu.texture.from_image(image_map.image)
     except RuntimeError:  # the file was removed after the scene was read
         return None
     texture.extend_mode(image_map.extension)
     texture.filter_mode(image_map.is_smooth)
     texture.anisotropic_filter(False)  # blurs with software drivers
     return texture
+
+
+@baked_cache.keeping
+def _baked_texture(picture):
+    texels = np.ascontiguousarray(picture.texels)
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    return gpu.types.GPUTexture(texels.shape[1::-1], format="RGBA16F", data=data)
 
 
 @texture_cache.keeping

@@ -6,7 +6,7 @@
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.maps import image_pixels, sources
-from ..data.pictures import drawn_meshes, root_colors, surface_means, unread_nodes, world_panoramas
+from ..data.pictures import drawn_meshes, root_colors, surface_bakes, surface_means, unread_nodes, world_panoramas
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
@@ -102,8 +102,12 @@ OTHERS = (
     guide_simulation.stiffness_cache,
     shaders.error_cache,
     surface_shading.texture_cache,
+    surface_shading.baked_cache,
     surface_textures.surface_cache,
     notices.printed_cache,
+    surface_bakes.process_cache,
+    surface_bakes.bake_cache,
+    surface_bakes.last_cache,
     world_panoramas.process_cache,
     world_panoramas.last_cache,
     guide_lines.hue_cache,

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import world_digest, world_panoramas
+from hair_addon.blender.data.pictures import kept_files, world_digest, world_panoramas
 from hair_addon.blender.gpu import ambient_visibility, lights, strand_textures, surface_textures, world_texture
 from hair_addon.blender.host import cli_command
 from hair_addon.blender.render import offscreen
@@ -221,7 +221,7 @@ def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, monkeypa
     """A view shows the last panorama until the next is rendered, and panels name the world that is being rendered."""
     rotation, _part = mixed_world(scene)
     rotation.default_value = (0.21, 0.0, 0.0)
-    former = world_panoramas._folder() / f"{world_digest.digest_of(scene.world)}.exr"
+    former = kept_files.folder("worlds") / f"{world_digest.digest_of(scene.world)}.exr"
     former.write_bytes(b"")
     assert lights.read_world(scene, waits=False).image.path == str(former)
     assert not world_panoramas.sentences()

@@ -4,13 +4,14 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import bpy
 import numpy as np
 
 from ....core.geometry.mesh import Faces
 from ...host.caches import Cache
 from ...host.notices import can_be_drawn, name_of
 from .. import scene
-from . import surface_materials, surface_means
+from . import surface_bakes, surface_materials, surface_means, unread_nodes
 from .rendered_instances import is_rendered, placed_by
 
 
@@ -128,6 +129,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
     UVs are needed without images too.
     """
     meshes, override = [], depsgraph.view_layer_eval.material_override
+    bakes = _bakes(depsgraph, viewport, override)
     for instance in depsgraph.object_instances:
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
             is_holdout = viewport is None and _has(instance, "holdout_get", depsgraph.view_layer)
@@ -137,12 +139,27 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             needs_normals = has_normals
             if not isinstance(has_normals, bool):
                 needs_normals = instance.object.original.session_uid in has_normals
-            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, needs_normals, override, has_uvs)
+            bake = bakes.get(instance.object.original.session_uid)
+            read_as = is_holdout, is_moving, needs_normals, override, has_uvs, bake
+            mesh = _read_drawn_mesh(instance.object, matrix, *read_as)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
             meshes.append(replace(mesh, owner=owner_of(instance), **rays))
     for cache in (scene.faces_cache, layout_cache):
         cache.make_room(len(meshes))
     return [mesh for mesh in meshes if len(mesh.triangles)]
+
+
+def _bakes(depsgraph, viewport, override):
+    """Return {session_uid: `Bake`} of the objects that a viewport or a render shows; a render waits for them."""
+    if not any(unread_nodes.baked_labels(material) for material in bpy.data.materials):
+        return {}  # without reading the instances once more
+    shown = {
+        one.object.original.session_uid: one.object
+        for one in depsgraph.object_instances
+        if one.object.type == "MESH" and one.show_self and _is_surface_seen(one, viewport)
+    }
+    is_render = viewport is None
+    return surface_bakes.find(shown.values(), override, for_render=is_render, waits=is_render)
 
 
 def split_clear(meshes):
@@ -209,15 +226,17 @@ def _some_parts(mesh, parts):
     )
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs, bake=None):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
         layout = _layout(mesh_object, mesh, is_moving)
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
-        parts = _parts(mesh_object, layout.runs, override)
-        uvs = _read_uvs(mesh, layout.loops, parts, has_uvs)
+        if bake is not None and not bake.fits(len(mesh.loops), name_of(mesh_object)):
+            bake = None
+        parts = _parts(mesh_object, layout, override, bake)
+        uvs = _read_uvs(mesh, layout.loops, parts, has_uvs, bake)
     finally:
         mesh_object.to_mesh_clear()
     materials = tuple((count, material) for _first, count, material in parts)
@@ -267,17 +286,20 @@ def _layout(mesh_object, mesh, is_moving):
     return layout_cache.keep(uid, _Layout(faces, slots, triangles.ravel(), runs))
 
 
-def _parts(mesh_object, runs, override):
+def _parts(mesh_object, layout, override, bake):
     """`DrawnMesh.parts` of an evaluated mesh, one for each material; override: the view layer's material."""
     materials = [override or slot.material for slot in mesh_object.material_slots] or [override]
-    ends = 3 * np.cumsum([count for _slot, count in runs])
-    return tuple(
-        (int(end) - 3 * count, 3 * count, surface_materials.read_material(materials[slot]))
-        for (slot, count), end in zip(runs, ends, strict=True)
-    )
+    parts, first = [], 0
+    for slot, count in layout.runs:
+        material = surface_materials.read_material(materials[slot])
+        if bake is not None and count and unread_nodes.baked_labels(materials[slot]):
+            material = bake.material(material, layout.loops[first : first + 3 * count])
+        parts.append((first, 3 * count, material))
+        first += 3 * count
+    return tuple(parts)
 
 
-def _read_uvs(mesh, loops, parts, has_uvs):
+def _read_uvs(mesh, loops, parts, has_uvs, bake=None):
     """Return (3 F, 2) float32 UVs of drawn corners, for each part from the UV map of its images; None without UV
     maps.
 
@@ -286,7 +308,7 @@ def _read_uvs(mesh, loops, parts, has_uvs):
     names = [material.uv_map for _first, _count, material in parts]
     names = ["" if name is None and has_uvs else name for name in names]
     layers = [None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh)) for name in names]
-    if all(layer is None for layer in layers):
+    if all(layer is None for layer in layers) and not any(material.is_baked for *_corners, material in parts):
         return None
     uvs = np.zeros((len(loops), 2), np.float32)
     for (first, count, _material), layer in zip(parts, layers, strict=True):
@@ -294,6 +316,9 @@ def _read_uvs(mesh, loops, parts, has_uvs):
             found = np.empty((len(mesh.loops), 2), np.float32)
             layer.uv.foreach_get("vector", found.ravel())
             uvs[first : first + count] = found[loops[first : first + count]]
+    for first, count, material in parts:
+        if material.is_baked:
+            uvs[first : first + count] = bake.uvs[loops[first : first + count]]
     return uvs
 
 

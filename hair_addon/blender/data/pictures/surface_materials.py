@@ -3,7 +3,6 @@
 
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
@@ -23,13 +22,14 @@ _EXTENSIONS = {"REPEAT": "REPEAT", "EXTEND": "EXTEND", "CLIP": "CLAMP_TO_BORDER"
 
 @dataclass(frozen=True)
 class ImageMap:
-    """An image of a material. uv_map: name of its UV map, "" for the active one.
+    """An image of a material: Blender's, or a `surface_bakes.BakedPicture`. uv_map: name of its UV map, "" for the
+    active one.
 
     rows: (2, 3) float, from (u, v, 1) to coordinates of the image; channels: (4,) weights of RGBA for an image that is
     read as a number; extension: of a GPU texture; is_opaque: whether alpha does not darken the color.
     """
 
-    image: bpy.types.Image
+    image: object
     uv_map: str
     rows: np.ndarray
     channels: tuple
@@ -56,6 +56,7 @@ class SurfaceMaterial:
     normal_image: ImageMap | None = None
     name: str = ""  # of the Blender material, "" for none
     index: int = 0  # its pass index
+    is_baked: bool = False  # whether its images have the UVs of a `surface_bakes.Bake`
 
     @property
     def is_invisible(self):
@@ -182,6 +183,21 @@ def _image_map(shader_input, material, uv_map=""):
     # Blender multiplies colors by straight alpha, unless a material reads the alpha.
     is_opaque = node.outputs["Alpha"].is_linked or node.image.is_float or node.image.alpha_mode != "STRAIGHT"
     return ImageMap(node.image, own_map or uv_map, rows, channels, extension, is_smooth, is_opaque)
+
+
+def reads_image(shader_input):
+    """Whether a `ShaderInput` reads an image that `read_material` reads, or that no picture can be baked of: movies and
+    sequences. The file is not loaded.
+    """
+    found, _output = shader_input.source()
+    if found is not None and found.type == "SEPARATE_COLOR" and found.node.mode == "RGB":
+        found, _output = found["Color"].source()
+    if found is None or found.type != "TEX_IMAGE":
+        return False
+    image = found.node.image
+    if image is None or image.source in {"SEQUENCE", "MOVIE"}:
+        return True
+    return image.source != "TILED" and _mapping(found["Vector"]) is not None
 
 
 def _is_readable(image, material):

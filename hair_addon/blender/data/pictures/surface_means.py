@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from ....core.imaging import texture_means
@@ -51,14 +52,16 @@ def of_image(image_map, uvs):
     uvs: (3 F, 2) of their corners.
     """
     image = image_map.image
-    picture = _picture_of(image)
+    is_baked = not isinstance(image, bpy.types.Image)
+    picture = image.texels if is_baked else _picture_of(image)
     if picture is None:
         return None
-    key = image.session_uid, len(uvs)
+    key = id(image) if is_baked else image.session_uid, len(uvs)
     known = mean_cache.get(key)
     if known is None or not known.fits(picture, image_map, uvs):
+        drawn = picture if is_baked else _as_drawn(picture, image, image_map)
         placed = uvs @ image_map.rows[:, :2].T + image_map.rows[:, 2]
-        means = texture_means.triangle_means(_as_drawn(picture, image, image_map), placed, image_map.extension)
+        means = texture_means.triangle_means(drawn, placed, image_map.extension)
         means = ImageMeans(means[:, :3], _of_part(means[:, :3], uvs))
         known = mean_cache.keep(key, _Known(picture, image_map, uvs, means))
     return known.means

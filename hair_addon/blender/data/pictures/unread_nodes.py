@@ -13,9 +13,8 @@ sentence_cache = Cache()  # session_uid of a scene → `sentences` of it
 _OF_LIGHTS = (
     "Nodes of lights have no effect in Vellus, except Color and Strength of an Emission node, as values: {names}."
 )
-_OF_MATERIALS = (
-    "Nodes of materials have no effect on surfaces in Vellus, except a shader's values and image textures: {names}."
-)
+_OF_MATERIALS = "Only values of these inputs of surfaces' shaders are read, not the nodes: {names}."
+_OF_BAKED = "Cycles bakes these nodes of materials on surfaces: {names}."
 
 
 def shown_sentences(scene):
@@ -29,48 +28,75 @@ def sentences(scene):
     lights = {one.data for one in objects if one.type == "LIGHT"}
     materials = {slot.material for one in objects if one.type == "MESH" for slot in one.material_slots}
     found = (
-        (_OF_LIGHTS, {light: _unread_of(light.node_tree, _inputs_of_light, ()) for light in lights}),
-        (
-            _OF_MATERIALS,
-            {one: _unread_of(one.node_tree, _inputs_of(one), _IMAGES) for one in materials if one is not None},
-        ),
+        (_OF_LIGHTS, {light: _unread_of(light.node_tree, _inputs_of_light) for light in lights}),
+        (_OF_BAKED, {one: baked_labels(one) for one in materials if one is not None}),
+        (_OF_MATERIALS, {one: _unread_values(one) for one in materials if one is not None}),
     )
     return [(text, {"names": _listed(unread)}) for text, unread in found if any(unread.values())]
 
 
-_IMAGES = ("TEX_IMAGE", "NORMAL_MAP", "SEPARATE_COLOR")
+_BAKED = {"Base Color", "Color", "Roughness", "Metallic", "Normal"}  # inputs of shaders
+
+
+def baked_labels(material):
+    """Return the labels of the nodes of a material for which Cycles bakes it; empty if it is read without."""
+    shader = None if material is None else _shown(material.node_tree)
+    if shader is None or shader.type in _UNBAKED:
+        return []
+    names = surface_materials.inputs_read(shader, material)
+    if names is None:
+        return [shader.node.bl_label]
+    names = [name for name in names if name in _BAKED and shader.type != "BSDF_GLASS"]
+    return [label for name in names for label in _before(shader[name], _reads_picture)]
+
+
+_UNBAKED = {"HOLDOUT", "EMISSION", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"}
+
+
+def _unread_values(material):
+    """Return the labels of nodes of a material that neither are read nor baked."""
+    shader = _shown(material.node_tree)
+    names = None if shader is None else surface_materials.inputs_read(shader, material)
+    names = [name for name in names or () if name not in _BAKED or shader.type == "BSDF_GLASS"]
+    return [label for name in names for label in _before(shader[name], _reads_picture)]
+
+
+def _reads_picture(shader_input):
+    """Whether an input reads an image, also through a Normal Map node."""
+    found = shader_input.source()[0]
+    if found is not None and found.type == "NORMAL_MAP" and found.node.space == "TANGENT":
+        return surface_materials.reads_image(found["Color"]) or found["Color"].constant() is not None
+    return surface_materials.reads_image(shader_input)
 
 
 def _inputs_of_light(shader):
     return ("Color", "Strength") if shader.type == "EMISSION" else None
 
 
-def _inputs_of(material):
-    return lambda shader: surface_materials.inputs_read(shader, material)
-
-
-def _unread_of(tree, read, textures):
-    """Return the labels of the nodes that a tree's output depends on and that are not read.
-
-    read: a function that returns the names of the inputs of a `ShaderNode` that are read, None if the node is not read;
-    textures: types of other nodes that are read.
-    """
+def _shown(tree):
+    """Return the `ShaderNode` that a tree's output shows, or None."""
     output = None if tree is None else tree.get_output_node("ALL")
-    if output is None:
-        return []
-    shader = ShaderInput(output.inputs["Surface"]).source()[0]
+    return None if output is None else ShaderInput(output.inputs["Surface"]).source()[0]
+
+
+def _unread_of(tree, read):
+    """Return the labels of the nodes that a light's output depends on and that are not read.
+
+    read: a function that returns the names of the inputs of a `ShaderNode` that are read, None if the node is not read.
+    """
+    shader = _shown(tree)
     if shader is None:
         return []
     names = read(shader)
     if names is None:
         return [shader.node.bl_label]
-    return [label for name in names for label in _before(shader[name], textures)]
+    return [label for name in names for label in _before(shader[name])]
 
 
-def _before(shader_input, textures):
-    """Return the label of the node that an input reads, unless it is a constant or of types that are read."""
+def _before(shader_input, is_read=lambda _input: False):
+    """Return the label of the node that an input reads, unless it is a constant or `is_read` by others."""
     node = shader_input.source()[0]
-    if node is None or node.type in textures or shader_input.constant() is not None:
+    if node is None or is_read(shader_input) or shader_input.constant() is not None:
         return []
     return [node.node.bl_label]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A digest of a world's nodes: equal for worlds that look the same."""
+"""A digest of the nodes of a world or a material: equal for those that look the same."""
 
 import hashlib
 from pathlib import Path
@@ -11,7 +11,9 @@ _LAYOUT = {"rna_type", "name", "label", "is_active_output", "debug_zone_body_laz
 
 
 def digest_of(world):
-    """Return a digest of the nodes of a world, evaluated or not, with their settings, groups, images and objects."""
+    """Return a digest of the nodes of a world or material, evaluated or not, with their settings, groups, images and
+    objects.
+    """
     return hashlib.blake2b(repr(_of_tree(world.node_tree, ())).encode("utf-8", "replace"), digest_size=16).hexdigest()
 
 

@@ -13,13 +13,11 @@ from ....core.errors import HairError, cause_of
 from ...host.caches import Cache
 from ...host.notices import name_of
 from ...host.other_process import OtherProcess
-from ...settings import preferences
 from ...settings.translations import interface_text
-from . import world_digest
+from . import kept_files, world_digest
 
 _PATIENCE = 300.0  # [s] for a panorama
 _LOOK = 0.25  # [s] between checks of processes
-_MOST_KEPT = 64  # files
 
 process_cache = Cache()  # digest → _Rendering: running, or failed
 last_cache = Cache()  # session_uid of a world → the last panorama of any of its nodes
@@ -67,7 +65,7 @@ def file_of(world, frame, waits):
     waits: return only once it is there. Raises `HairError` if it cannot be rendered.
     """
     digest = world_digest.digest_of(world)
-    path, uid = _folder() / f"{digest}.exr", world.original.session_uid
+    path, uid = kept_files.folder("worlds") / f"{digest}.exr", world.original.session_uid
     if path.is_file():
         process_cache.invalidate(digest)
         return last_cache.keep(uid, path)
@@ -81,7 +79,7 @@ def file_of(world, frame, waits):
     if rendering.reason:
         sentence = 'Cycles cannot render the nodes of the world "{world}": {reason}'
         raise HairError(sentence, world=rendering.world, reason=rendering.reason)
-    _remove_oldest(path)
+    kept_files.remove_oldest(path)
     process_cache.invalidate(digest)
     return last_cache.keep(uid, path)
 
@@ -112,11 +110,12 @@ def look():
     if any(ended):
         for world in bpy.data.worlds:
             world.update_tag()
-        _redraw_panels()
+        redraw_panels()
     return _LOOK if _running() else None
 
 
-def _redraw_panels():
+def redraw_panels():
+    """Redraw panels and viewports."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"PROPERTIES", "VIEW_3D"}:
@@ -125,21 +124,3 @@ def _redraw_panels():
 
 def _running():
     return [one for one in process_cache.values() if isinstance(one, _Rendering) and one.is_running]
-
-
-def _folder():
-    """Return the folder of panoramas."""
-    if preferences.is_extension():
-        folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="worlds", create=True)
-        if folder:  # empty if Blender could not create it, which it reports on the console
-            return Path(folder)
-    folder = Path(bpy.app.tempdir or tempfile.gettempdir()) / "vellus_worlds"
-    folder.mkdir(exist_ok=True)
-    return folder
-
-
-def _remove_oldest(path):
-    """Remove the oldest files beside a panorama if there are too many."""
-    files = sorted(path.parent.glob("*.exr"), key=lambda file: file.stat().st_mtime)
-    for file in files[:-_MOST_KEPT]:
-        file.unlink(missing_ok=True)

@@ -5,7 +5,7 @@ import bpy
 from bl_ui import properties_view_layer
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
-from ...data.pictures import unread_nodes, world_panoramas
+from ...data.pictures import surface_bakes, unread_nodes, world_panoramas
 from ...render import data_passes, mattes
 from ...render.frames.engine import NAME
 from ...render.viewport import live_light
@@ -38,7 +38,7 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
         setting_rows.rows(self.layout, context.scene.vellus, RenderSettings, names)
         for sentence in map(interface_text, live_light.obstacles(context.scene)):
             write(self.layout, context, sentence, "INFO")
-        for sentence in world_panoramas.sentences():
+        for sentence in (*world_panoramas.sentences(), *surface_bakes.sentences()):
             write(self.layout, context, sentence, "INFO")
         for sentence, values in unread_nodes.shown_sentences(context.scene):
             write(self.layout, context, interface_text(sentence, **values), "INFO")

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of surfaces whose materials have nodes that Vellus does not read: another process bakes them once.
+
+The pictures of an object are kept by the digest of its materials and its mesh.
+"""
+
+import hashlib
+import json
+import tempfile
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ....core.errors import cause_of
+from ...host.caches import Cache
+from ...host.notices import name_of, say
+from ...host.other_process import OtherProcess
+from ...settings.translations import interface_text
+from .. import scene
+from . import kept_files, surface_materials, unread_nodes, world_digest, world_panoramas
+from .shader_sockets import nodes_of
+
+_PATIENCE = 600.0  # [s] for all surfaces of a scene
+_LOOK = 0.25  # [s] between checks of processes
+
+process_cache = Cache()  # digest → `_Baking`: running, or failed
+bake_cache = Cache(capacity=64)  # path → `Bake`
+last_cache = Cache()  # session_uid of an object → path of its last pictures, with any materials
+
+
+@dataclass(frozen=True, eq=False)
+class BakedPicture:
+    """One picture of a `Bake`: texels (H, W, 4) float32, the lowest row first."""
+
+    texels: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Bake:
+    """Pictures of the materials of an object.
+
+    uvs: (C, 2) float32 of the corners of its mesh; surface: linear color and roughness; normal: in tangent space, None
+    without nodes of normals; metallic, weight: (H, W) float16, weight: the part of the surface that is opaque.
+    """
+
+    uvs: np.ndarray
+    surface: BakedPicture
+    normal: BakedPicture | None
+    metallic: np.ndarray
+    weight: np.ndarray
+
+    def fits(self, corner_count, name):
+        """Whether a mesh has the corners of the pictures; if not, print a message."""
+        if len(self.uvs) != corner_count:
+            say(
+                f'The baked materials of "{name}" belong to another mesh: apply modifiers that change it at each frame.'
+            )
+        return len(self.uvs) == corner_count
+
+    def material(self, plain, loops):
+        """Return a `SurfaceMaterial` with the pictures; loops: (3 F,) indices of its corners."""
+        metallic, weight = self.means(loops)
+        if weight < 0.5:  # more of the surface is transparent than opaque
+            return surface_materials.SurfaceMaterial(is_clear=True, name=plain.name, index=plain.index)
+        every, roughness = (0.2126, 0.7152, 0.0722, 0.0), (0.0, 0.0, 0.0, 1.0)
+        color_image, roughness_image, normal_image = (
+            None
+            if picture is None
+            else surface_materials.ImageMap(picture, "", np.eye(2, 3), channels, "EXTEND", True, True)
+            for picture, channels in ((self.surface, every), (self.surface, roughness), (self.normal, every))
+        )
+        return replace(
+            plain,
+            metallic=metallic,
+            normal_strength=1.0,
+            color_image=color_image,
+            roughness_image=roughness_image,
+            normal_image=normal_image,
+            is_baked=True,
+        )
+
+    def means(self, loops):
+        """Return (metallic, weight) of corners."""
+        height, width = self.metallic.shape
+        centers = self.uvs[loops].reshape(-1, 3, 2).mean(axis=1)
+        column, row = (np.clip(centers * (width, height), 0, (width - 1, height - 1))).astype(int).T
+        return tuple(float(one[row, column].mean(dtype=np.float64)) for one in (self.metallic, self.weight))
+
+
+class _Baking:
+    """A process that bakes objects; reason: why it failed, empty otherwise."""
+
+    def __init__(self, paths, objects, for_render):
+        self.reason, self._paths = "", paths
+        self.names = [name_of(one) for one in objects]
+        self._folder = tempfile.TemporaryDirectory(prefix=".", dir=paths[0].parent, ignore_cleanup_errors=True)
+        folder = Path(self._folder.name)
+        blend, originals = folder / "surfaces.blend", [one.original for one in objects]
+        words = ["bake_surfaces", str(blend), "--out", str(folder)]
+        words += ["--names", json.dumps([one.name for one in originals]), *(["--for-render"] if for_render else [])]
+        try:
+            bpy.data.libraries.write(str(blend), set(originals), path_remap="ABSOLUTE", fake_user=True)
+            self._process = OtherProcess(words, folder / "errors")
+        except (OSError, RuntimeError) as error:
+            self._process, self.reason = None, cause_of(error)
+
+    @property
+    def is_running(self):
+        """Whether it runs, or its end has not been handled yet."""
+        return self._process is not None
+
+    def is_ended(self, waits):
+        """Whether it has ended, after waiting if `waits`; the files are then in their places, or there is a reason."""
+        if self._process is not None and waits:
+            self._process.wait(_PATIENCE)
+        if self._process is None or self._process.is_running:
+            return self._process is None
+        complaint, self._process = self._process.complaint(), None
+        for index, path in enumerate(self._paths):
+            try:
+                (Path(self._folder.name) / f"{index}.npz").replace(path)
+            except OSError as error:
+                self.reason = complaint or cause_of(error)
+        self._folder.cleanup()
+        return True
+
+
+def find(objects, override, for_render, waits):
+    """Return {session_uid of a mesh object: `Bake`} of evaluated objects whose materials need one.
+
+    override: the view layer's material; waits: return only once all are there. Without `waits` the last pictures of an
+    object, or none, stand in for those that are being baked.
+    """
+    wanted = {one.original.session_uid: one for one in objects if _needs_bake(one, override)}
+    paths = {uid: _path_of(one) for uid, one in wanted.items()}
+    missing = [uid for uid, path in paths.items() if not path.is_file()]
+    _start([uid for uid in missing if process_cache.get(paths[uid].stem) is None], wanted, paths, for_render, waits)
+    for uid in missing:
+        baking = process_cache.get(paths[uid].stem)
+        if baking is not None and baking.is_ended(waits) and baking.reason:
+            say(f'Cycles cannot bake the materials of "{name_of(wanted[uid])}": {baking.reason}')
+    found = {}
+    for uid, path in paths.items():
+        path = last_cache.keep(uid, path) if path.is_file() else last_cache.get(uid)
+        if path is not None and path.is_file():
+            found[uid] = bake_cache.get(path, lambda path=path: _read(path))
+    return {uid: bake for uid, bake in found.items() if bake is not None}
+
+
+def add_uv_map(mesh, name, uvs):
+    """Add a UV map (C, 2) to a mesh as the active one, while renders use the former one; None if there are too many."""
+    shown = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
+    layer = mesh.uv_layers.new(name=name, do_init=False)
+    if layer is None:
+        return None
+    layer.uv.foreach_set("vector", uvs.ravel())
+    if shown is not None:
+        mesh.uv_layers[shown].active_render = True
+    layer = mesh.uv_layers[name]
+    layer.active = True
+    return layer
+
+
+def _start(uids, objects, paths, for_render, waits):
+    """Start a process for objects; a view has one process, as dragged or played nodes change."""
+    if not uids or (not waits and _running()):
+        return
+    baking = _Baking([paths[uid] for uid in uids], [objects[uid] for uid in uids], for_render)
+    for uid in uids:
+        process_cache.keep(paths[uid].stem, baking)
+        kept_files.remove_oldest(paths[uid])
+    if not waits and not bpy.app.timers.is_registered(look):
+        bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
+
+
+def look():
+    """Timer: show finished pictures. Returns the time to the next check [s], None after the last."""
+    running = _running()
+    ended = [one.is_ended(waits=False) for one in running]
+    if any(ended):
+        for material in bpy.data.materials:
+            material.update_tag()
+        world_panoramas.redraw_panels()
+    return _LOOK if _running() else None
+
+
+def sentences():
+    """Translated sentences about surfaces that are baked now or cannot be, for panels."""
+    text = 'Cycles bakes the materials of "{name}". Until then it is drawn as before, or in plain color.'
+    failed = 'Cycles cannot bake the materials of "{name}": {reason}'
+    found = []
+    for baking in dict.fromkeys(process_cache.values()):
+        for name in baking.names if baking.is_running or baking.reason else ():
+            found.append(interface_text(text if baking.is_running else failed, name=name, reason=baking.reason))
+    return found
+
+
+def _running():
+    return list({one: None for one in process_cache.values() if one.is_running})
+
+
+def _needs_bake(mesh_object, override):
+    materials = (override,) if override is not None else [slot.material for slot in mesh_object.material_slots]
+    return override is None and any(one is not None and unread_nodes.baked_labels(one) for one in materials)
+
+
+def _path_of(mesh_object):
+    """Return the file of the pictures of an evaluated object."""
+    original, evaluated = mesh_object.original.data, mesh_object.data
+    found = hashlib.blake2b(digest_size=16)
+    materials = [slot.material for slot in mesh_object.material_slots]
+    found.update(repr([one and world_digest.digest_of(one) for one in materials]).encode())
+    if any(_is_placed(one) for one in materials if one is not None):
+        found.update(repr(([tuple(row) for row in mesh_object.matrix_world], tuple(mesh_object.color))).encode())
+    faces = scene.cached_faces(mesh_object.original, evaluated)
+    found.update(np.ascontiguousarray(faces.corner_vertices))
+    found.update(np.ascontiguousarray(faces.starts))
+    for attribute in original.attributes:
+        if attribute.data_type in _COMPONENTS:
+            name, components, dtype = _COMPONENTS[attribute.data_type]
+            values = np.empty(len(attribute.data) * components, dtype)
+            attribute.data.foreach_get(name, values)
+            found.update(attribute.name.encode())
+            found.update(values)
+    return kept_files.folder("surfaces") / f"{found.hexdigest()}.npz"
+
+
+# Data types of attributes that materials read → name, number and type of their components.
+_COMPONENTS = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+}
+
+
+def _is_placed(material):
+    """Whether a material depends on the place of its object."""
+    kinds = {node.type for node in nodes_of(material.node_tree)} if material.node_tree else set()
+    return bool(kinds & {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"})
+
+
+def _read(path):
+    """Return the `Bake` of a file; None if it is damaged, and it is baked again."""
+    try:
+        return _read_arrays(path)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        path.unlink(missing_ok=True)
+        return None
+
+
+def _read_arrays(path):
+    with np.load(path) as found:
+        color, normal = found["color"], found["normal"]
+        texels = np.concatenate([color, found["roughness"][..., None]], axis=-1).astype(np.float32)
+        bent = None
+        if normal.size:
+            bent = np.ones((*normal.shape[:2], 4), np.float32)
+            bent[..., :3] = normal
+        return Bake(
+            found["uvs"],
+            BakedPicture(texels),
+            None if bent is None else BakedPicture(bent),
+            found["metallic"],
+            found["weight"],
+        )

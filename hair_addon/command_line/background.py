@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures by Cycles for views and renders: panoramas of worlds, and materials of meshes.
+
+blender/data/pictures runs these commands in a process of its own. They are for internal use and not listed.
+"""
+
+import json
+
+from ..core import lazy
+
+blender = lazy.Package("..blender", __package__)
+
+
+def add(verbs):
+    """Add the options of the commands."""
+    panorama = verbs.add_parser("panorama")
+    panorama.add_argument("input", help="a .blend with one world")
+    panorama.add_argument("--out", required=True, help="the .exr")
+    panorama.add_argument("--frame", type=float, default=1.0)
+    panorama.set_defaults(run=run, json=True, quiet=False, verbose=False)
+    bake = verbs.add_parser("bake_surfaces")
+    bake.add_argument("input", help="a .blend with the meshes")
+    bake.add_argument("--names", required=True, help="names of the objects, a JSON list")
+    bake.add_argument("--out", required=True, help="the folder of 0.npz, 1.npz, …")
+    bake.add_argument("--for-render", action="store_true", help="with the modifiers of renders")
+    bake.set_defaults(run=bake_surfaces, json=True, quiet=False, verbose=False)
+
+
+def run(given, console):
+    """Render a panorama of a file's world."""
+    blender.io.pictures.world_panorama.render(given.input, given.frame, given.out)
+    console.result({"panorama": given.out}, "")
+
+
+def bake_surfaces(given, console):
+    """Bake the materials of the named objects of a file."""
+    names = json.loads(given.names)
+    blender.io.pictures.surface_bake.bake(given.input, names, given.for_render, given.out)
+    console.result({"baked": len(names)}, "")

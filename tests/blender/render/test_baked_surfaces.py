@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials of any nodes are baked once by Cycles, and surfaces and the light they reflect have their colors."""
+
+import sys
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data.pictures import drawn_meshes, surface_bakes, unread_nodes
+from hair_addon.blender.host import cli_command
+from hair_addon.blender.render import offscreen
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.pictures.rendering import add_orthographic_camera
+
+SIZE = 48
+
+
+@pytest.fixture
+def stage(scene):
+    """Return a scene with a sun, an even world and a camera that looks along Y at two meters."""
+    add_orthographic_camera(scene)
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy, light.angle = 2.0, 0.3
+    sun = bpy.data.objects.new("Sun", light)
+    sun.rotation_euler = (0.9, 0.3, 0.0)
+    scene.collection.objects.link(sun)
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.3, 0.35, 0.4, 1.0)
+    return scene
+
+
+def wall(material):
+    """Return a mesh that faces the camera, without a UV map, with a material."""
+    bpy.ops.mesh.primitive_grid_add(size=1.6, x_subdivisions=5, y_subdivisions=3, rotation=(1.5708, 0.0, 0.0))
+    placed = bpy.context.object
+    placed.data.uv_layers.remove(placed.data.uv_layers[0])
+    placed.data.materials.append(material)
+    return placed
+
+
+def node(tree, kind, target=None, coordinates=True, **inputs):
+    made = tree.nodes.new(kind)
+    for name, value in inputs.items():
+        made.inputs[name].default_value = value
+    if coordinates:
+        tree.links.new(tree.nodes["Coordinates"].outputs["Object"], made.inputs["Vector"])
+    if target is not None:
+        tree.links.new(made.outputs[0], target)
+    return made
+
+
+def new_tree(name):
+    """Return a material, its tree with coordinates, and its Principled BSDF."""
+    material = bpy.data.materials.new(name)
+    tree = material.node_tree
+    tree.nodes.new("ShaderNodeTexCoord").name = "Coordinates"
+    return material, tree, tree.nodes["Principled BSDF"]
+
+
+def bricks():
+    """Return a material of bricks with noisy roughness."""
+    material, tree, shader = new_tree("Bricks")
+    node(tree, "ShaderNodeTexBrick", shader.inputs["Base Color"], Scale=2.0, Color1=(0.7, 0.2, 0.1, 1.0))
+    node(tree, "ShaderNodeTexNoise", shader.inputs["Roughness"], Scale=2.0)
+    return material
+
+
+def layered():
+    """Return a material whose shaders, one of them in a group, are mixed by a voronoi texture."""
+    material, tree, shader = new_tree("Layered")
+    shader.inputs["Base Color"].default_value = (0.1, 0.5, 0.8, 1.0)
+    shader.inputs["Specular IOR Level"].default_value = 0.0
+    inside = bpy.data.node_groups.new("Coat", "ShaderNodeTree")
+    inside.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
+    diffuse = inside.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (0.9, 0.6, 0.1, 1.0)
+    inside.links.new(diffuse.outputs[0], inside.nodes.new("NodeGroupOutput").inputs[0])
+    group, mix = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeMixShader")
+    group.node_tree = inside
+    node(tree, "ShaderNodeTexVoronoi", mix.inputs[0], Scale=3.0)
+    tree.links.new(shader.outputs[0], mix.inputs[1])
+    tree.links.new(group.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    return material
+
+
+def by_cycles(tmp_path):
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 64, False
+    scene.cycles.max_bounces, scene.cycles.pixel_filter_type = 0, "BOX"
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage, scene.render.film_transparent = 100, True
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(tmp_path / "cycles.exr")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath, check_existing=False)
+    return np.array(image.pixels[:], np.float32).reshape(SIZE, SIZE, 4)
+
+
+def regions(picture):
+    """Return the mean colors of 6 × 6 parts of a picture that the surface covers."""
+    inner = picture[6:-6, 6:-6, :3]
+    return inner.reshape(6, 6, 6, 6, 3).mean(axis=(1, 3))
+
+
+@pytest.mark.farm
+def test_baked_surfaces_are_as_in_cycles(stage, tmp_path):
+    """A wall of bricks of varied roughness, and one of mixed shaders, have the colors of Cycles within 2 %, as does the
+    light that they reflect; both are baked once.
+    """
+    walls = [wall(bricks()), wall(layered())]
+    walls[1].location.z = 50.0
+    stage.view_layers[0].update()
+    for shown in (0, 1):
+        walls[shown].location.z, walls[1 - shown].location.z = 0.0, 50.0
+        bpy.context.view_layer.update()
+        drawn = offscreen.draw_picture(PictureSettings(SIZE, SIZE, 4, is_transparent=True))
+        expected = regions(by_cycles(tmp_path))
+        assert np.abs(regions(drawn) / expected - 1.0).mean() < 0.02
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        (mesh,) = (one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.to_world[2, 3] == 0.0)
+        ((_count, color),) = mesh.colors
+        np.testing.assert_allclose(mesh.triangle_materials[:, :3].mean(axis=0), color, rtol=0.02)
+    assert not surface_bakes.sentences()
+
+
+def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
+    """A view starts one process for all surfaces, and has plain colors with a sentence until it ends and after an
+    error.
+    """
+    placed = wall(bricks())
+    wall(layered())
+    for one in bpy.data.materials:
+        next(iter(one.node_tree.nodes)).name = one.name  # nodes of no other test
+    principled = next(one for one in placed.active_material.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    principled.inputs["Base Color"].default_value = (0.2, 0.3, 0.4, 1.0)
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    objects = [one.evaluated_get(depsgraph) for one in stage.objects if one.type == "MESH"]
+    assert surface_bakes.find(objects, None, for_render=False, waits=False) == {}
+    (process,) = set(surface_bakes.process_cache.values())
+    assert len(process.names) == len(surface_bakes.sentences()) == 2
+    for _look in range(200):
+        if surface_bakes.look() is None:
+            break
+        time.sleep(0.05)
+    assert surface_bakes.find(objects, None, for_render=False, waits=False) == {}
+    assert all("no Cycles" in sentence for sentence in surface_bakes.sentences())
+    assert len(set(surface_bakes.process_cache.values())) == 1
+    mesh = next(one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.owner[0] == placed.session_uid)
+    np.testing.assert_allclose(mesh.colors[0][1], (0.2, 0.3, 0.4), rtol=1e-6)
+
+
+def test_pictures_belong_to_nodes_and_meshes(stage):
+    """Pictures are kept while an object moves and poses; other nodes, attributes and faces have others."""
+    placed = wall(bricks())
+
+    def path():
+        bpy.context.view_layer.update()
+        return surface_bakes._path_of(placed.evaluated_get(bpy.context.evaluated_depsgraph_get()))
+
+    first = path()
+    placed.location.x = 1.0
+    placed.modifiers.new("Bend", "SIMPLE_DEFORM")
+    assert path() == first
+    placed.data.attributes.new("Paint", "FLOAT", "POINT")
+    second = path()
+    placed.modifiers.new("Smooth", "SUBSURF")
+    third = path()
+    brick = next(one for one in placed.active_material.node_tree.nodes if one.type == "TEX_BRICK")
+    brick.inputs["Scale"].default_value = 3.0
+    assert len({first, second, third, path()}) == 4
+
+
+def test_only_nodes_that_are_not_read_are_baked(scene):
+    """Images in UV coordinates and constants are read; images in other coordinates and other nodes are baked."""
+    material, tree, shader = new_tree("Skin")
+    image = node(tree, "ShaderNodeTexImage", shader.inputs["Base Color"], coordinates=False)
+    image.image = bpy.data.images.new("Skin", 4, 4)
+    node(tree, "ShaderNodeValue", shader.inputs["Roughness"], coordinates=False)
+    assert unread_nodes.baked_labels(material) == []
+    tree.links.new(tree.nodes["Coordinates"].outputs["Object"], image.inputs["Vector"])
+    assert unread_nodes.baked_labels(material) == ["Image Texture"]
+    tree.links.remove(image.inputs["Vector"].links[0])
+    bump = node(tree, "ShaderNodeBump", shader.inputs["Normal"], coordinates=False)
+    assert unread_nodes.baked_labels(material) == ["Bump"]
+    tree.nodes.remove(bump)
+    assert unread_nodes.baked_labels(material) == []
