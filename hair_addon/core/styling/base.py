@@ -141,14 +141,18 @@ class Step:
 
 
 def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:
-    """Return the profile at x (…, P), fractions from 0 to 1 of the length of strands of P points."""
-    y = np.clip((x - profile.start) / (1.0 - profile.start), 0.0, 1.0)
-    if profile.is_flipped:
-        y = 1.0 - _power(1.0 - y, profile.exponent)
-    else:
-        least = 0.5 / (x.shape[-1] - 1)
-        y = np.where(y < least, y * least ** (profile.exponent - 1.0), _power(y, profile.exponent))
-    return profile.root + (profile.tip - profile.root) * y
+    """Return the profile at x (S, P), fractions from 0 to 1 of the length of strands of P points.
+
+    The numbers of the profile are floats, or arrays (S,).
+    """
+    # Exponents are arrays, so that a strand has the same bits with a number and with an array of equal numbers.
+    numbers = profile.root, profile.tip, profile.exponent, profile.is_flipped, profile.start
+    root, tip, exponent, is_flipped, start = (np.reshape(number, (-1, 1)) for number in numbers)
+    y = np.clip((x - start) / (1.0 - start), 0.0, 1.0)
+    raised = _power(np.where(is_flipped, 1.0 - y, y), exponent)
+    least = 0.5 / (x.shape[-1] - 1)
+    y = np.where(is_flipped, 1.0 - raised, np.where(y < least, y * least ** (exponent - 1.0), raised))
+    return root + (tip - root) * y
 
 
 def _power(x, exponent):

@@ -30,27 +30,27 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Lean:
     """One style on guides.
 
-    settings: of the style; amounts (G,): of each guide; profiles: one `Profile` for all guides, or one for each; None
-    for the course of wet hair; directions (G, 3): unit; clearances (G,) [m]; curve (N,): the course of the amount, None
+    settings: of the style; amounts (G,): of each guide; profile: its numbers are floats, or arrays (G,); None for the
+    course of wet hair; directions (G, 3): unit; clearances (G,) [m]; curve (N,): the course of the amount, None
     for 1.
     """
 
     settings: StyleSettings
     amounts: np.ndarray
-    profiles: Sequence[Profile] | None
+    profile: Profile | None
     directions: np.ndarray
     clearances: np.ndarray
     curve: np.ndarray | None = None
 
     def is_same(self, other: "Lean") -> bool:
         """Return whether both styles lean guides equally."""
-        is_same = self.settings == other.settings and self.profiles == other.profiles
         arrays = (
             (self.amounts, other.amounts),
             (self.directions, other.directions),
             (self.clearances, other.clearances),
+            *zip(_numbers_of(self.profile), _numbers_of(other.profile), strict=False),
         )
-        is_same = is_same and courses.are_same(self.curve, other.curve)
+        is_same = self.settings == other.settings and courses.are_same(self.curve, other.curve)
         return is_same and all(np.array_equal(*pair) for pair in arrays)
 
     def course(self, chosen: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -59,12 +59,15 @@ class Lean:
         return found if self.curve is None else found * courses.at(self.curve, x)
 
     def _profile(self, chosen, x):
-        if self.profiles is None:
+        if self.profile is None:
             return np.clip(x / _WET_ROOT, 0.0, 1.0)
-        if len(self.profiles) == 1:
-            return base.evaluated(self.profiles[0], x)
-        rows = [base.evaluated(self.profiles[guide], its_x) for guide, its_x in zip(chosen, x, strict=True)]
-        return np.array(rows).reshape(x.shape)
+        numbers = _numbers_of(self.profile)
+        return base.evaluated(Profile(*(each[chosen] if isinstance(each, np.ndarray) else each for each in numbers)), x)
+
+
+def _numbers_of(profile):
+    """Return the numbers of a `Profile`; none for the course of wet hair."""
+    return [] if profile is None else [getattr(profile, field.name) for field in fields(profile)]
 
 
 def leans(
@@ -101,24 +104,14 @@ def leans(
         directions = _directions(settings, mesh, roots, targets)
         if directions is not None:
             clearances = _of_all(settings.clearance, len(roots))
-            profiles, curve = _profiles(settings, len(roots)), curves.get((place, "amount"))
-            found.append(Lean(declared, amounts, profiles, directions, clearances, curve))
+            curve = curves.get((place, "amount"))
+            found.append(Lean(declared, amounts, base.profile_of(settings), directions, clearances, curve))
     return found
 
 
 def _of_all(value, count):
     """Return (G,) float32 of one number for all guides, or of an array (G,)."""
     return np.broadcast_to(np.asarray(value, np.float32), count)
-
-
-def _profiles(settings, count):
-    """Return one `Profile` for all guides, or one for each if its numbers differ between guides."""
-    profile = base.profile_of(settings)
-    numbers = [getattr(profile, field.name) for field in fields(profile)]
-    if not any(isinstance(number, np.ndarray) for number in numbers):
-        return [profile]
-    rows = zip(*(np.broadcast_to(number, count).tolist() for number in numbers), strict=True)
-    return [Profile(*row) for row in rows]
 
 
 def _directions(settings, mesh, roots, targets):
