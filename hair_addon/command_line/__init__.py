@@ -29,19 +29,7 @@ from . import (
 )
 from .options import Parser
 
-_VERBS = (
-    groom,
-    tables,
-    transfer,
-    simulate,
-    render,
-    export,
-    cards,
-    tubes,
-    info,
-    settings,
-    import_mesh,
-)
+_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings, import_mesh, background)
 
 
 def main(arguments, program):

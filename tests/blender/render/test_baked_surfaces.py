@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import command_line
 from hair_addon.blender.data.pictures import drawn_meshes, surface_bakes, unread_nodes
 from hair_addon.blender.host import cli_command
 from hair_addon.blender.render import offscreen
@@ -151,6 +152,12 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
     assert len(set(surface_bakes.process_cache.values())) == 1
     mesh = next(one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.owner[0] == placed.session_uid)
     np.testing.assert_allclose(mesh.colors[0][1], (0.2, 0.3, 0.4), rtol=1e-6)
+
+
+def test_the_other_process_knows_its_commands():
+    for verb in ("panorama", "bake_surfaces"):
+        words = [verb, "a.blend", "--out", "b", *(["--names", "[]"] if verb == "bake_surfaces" else [])]
+        assert callable(command_line.parser("vellus").parse_args(words).run)
 
 
 def test_pictures_belong_to_nodes_and_meshes(stage):
