@@ -25,6 +25,7 @@ _OPAQUE = 0.5  # alpha above which a texture shows hair
 _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
+_INWARD = 0.2  # mean cosine between normals and the directions from the center, below which normals point inward
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
 _MOST_FACES = 20_000  # of a piece: larger pieces beside smaller pieces are bodies
 _MOST_SCULPTED = 500_000  # of a piece, if all pieces are larger than `_MOST_FACES`; takes ten seconds
@@ -268,14 +269,15 @@ def shown(strands: MeshStrands, alpha: np.ndarray) -> MeshStrands:
 def on_surface(strands: MeshStrands, surface: TriMesh) -> MeshStrands:
     """Return strands that begin on a surface [m]: cut where they leave it, or extended from the closest point.
 
-    Strands that begin far from it, or stay inside, do not change.
+    Strands that begin far from it, or stay inside, do not change. A surface with normals inward counts as the same
+    surface with normals outward.
     """
     query, starts = SurfaceQuery(surface), strands.starts
     points = strands.points.astype(np.float64)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     steps[starts[1:-1] - 1] = 0.0
     lengths = np.add.reduceat(np.append(steps, 0.0), starts[:-1])
-    heights = _heights(query, surface, points)
+    heights = _outward(surface) * _heights(query, surface, points)
     place = np.arange(len(points)) - np.repeat(starts[:-1], strands.counts)
     is_out = (heights > 0.0) & (place <= np.repeat(strands.counts // 2, strands.counts))
     first = np.minimum.reduceat(np.where(is_out, place, len(points)), starts[:-1])
@@ -313,6 +315,16 @@ def _firsts(strands, is_chosen):
     found = np.zeros(len(strands.points), int)
     found[strands.starts[:-1][is_chosen]] = 1
     return found
+
+
+def _outward(surface):
+    """Return -1 for a surface whose normals point inward, such as a mirrored mesh, else 1."""
+    away = surface.corners.mean(axis=1) - np.average(
+        surface.corners.mean(axis=1), axis=0, weights=surface.areas + 1e-30
+    )
+    facing = 0.5 * np.einsum("fi,fi->f", away, surface.scaled_normals)
+    reach = np.linalg.norm(away, axis=1) @ surface.areas
+    return -1.0 if facing.sum() < -_INWARD * reach else 1.0
 
 
 def _heights(query, surface, points):

@@ -17,6 +17,8 @@ _RECTANGULAR = 0.9  # area of a rectangular UV island relative to its bounding b
 _LONG = 1.5  # ratio of sides above which the longer sides run from root to tip
 _MOST_STATIONS = 64
 LEAST_STATIONS = 8
+_SMALL = 2_000  # inner vertices of pieces whose places are exact to rounding
+_EXACT, _CLOSE = 1e-26, 1e-18  # squares of residuals at which places are found, of small and of large pieces
 
 
 @dataclass(frozen=True)
@@ -227,10 +229,11 @@ def _relaxed(edges, is_inner, places):
         sums = [np.bincount(ends[:, 0], weights=values[ends[:, 1], axis], minlength=count) for axis in range(2)]
         return np.where(is_inner[:, None], degrees * values - np.stack(sums, axis=1), 0.0)
 
-    found = np.where(is_inner[:, None], 0.5, places)
+    is_small = np.count_nonzero(is_inner) <= _SMALL
+    found = np.where(is_inner[:, None], 0.5 if is_small else _places_between(ends, is_inner, places), places)
     rest = -differences(found)
     direction, square = rest.copy(), (rest**2).sum(axis=0)
-    limit = 1e-26 * np.maximum(square, 1.0)
+    limit = (_EXACT if is_small else _CLOSE) * np.maximum(square, 1.0)
     for _step in range(4 * int(np.count_nonzero(is_inner)) + 10):
         if (square <= limit).all():
             break
@@ -241,3 +244,32 @@ def _relaxed(edges, is_inner, places):
         before, square = square, (rest**2).sum(axis=0)
         direction = rest + square / np.maximum(before, 1e-300) * direction
     return found
+
+
+def _places_between(ends, is_inner, places):
+    """Return places (v, 2) by the number of edges to opposite sides: exact on a grid, and a start for the solution."""
+    order = np.argsort(ends[:, 0], kind="stable")
+    others = ends[order, 1]
+    starts = np.searchsorted(ends[order, 0], np.arange(len(places) + 1))
+    found = np.full(places.shape, 0.5)
+    for axis in range(2):
+        low, high = (_steps_from(~is_inner & (places[:, axis] == side), starts, others) for side in (0.0, 1.0))
+        is_between = np.isfinite(low) & np.isfinite(high)
+        found[is_between, axis] = low[is_between] / (low + high)[is_between]
+    return found
+
+
+def _steps_from(is_source, starts, others):
+    """Return the number of edges (v,) from each vertex to the nearest source, inf for none.
+
+    starts (v + 1,), others: neighbors of all vertices in turn.
+    """
+    steps = np.full(len(is_source), np.inf)
+    front, step = np.flatnonzero(is_source), 0
+    while len(front):
+        steps[front] = step
+        counts = starts[front + 1] - starts[front]
+        rows = np.arange(counts.sum()) + np.repeat(starts[front] - np.cumsum(counts) + counts, counts)
+        front = others[rows]
+        front, step = np.unique(front[np.isinf(steps[front])]), step + 1
+    return steps

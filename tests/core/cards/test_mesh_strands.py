@@ -6,13 +6,14 @@ import itertools
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import curve_frames, mesh_strands, outlines, tubes
+from hair_addon.core.cards import curve_frames, mesh_strands, outlines, ribbon_charts, tubes
 from hair_addon.core.cards.card_settings import TubeSettings
 from hair_addon.core.cards.mesh_strand_settings import MeshStrandSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import TriMesh, positions
 from tests.core.cards.conftest import sphere
+from tests.support.meshes import flat_grid
 
 FLOOR = TriMesh(
     np.array([(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], np.float32), np.array([(0, 1, 2), (0, 2, 3)], np.int32)
@@ -181,6 +182,19 @@ def test_strands_begin_on_the_surface(height):
     np.testing.assert_array_equal(mesh_strands.on_surface(far, FLOOR).points, far.points)
 
 
+def test_strands_begin_on_a_surface_with_normals_inward():
+    """The same surface with normals inward cuts and extends strands at the same places."""
+    ball = sphere()
+    inward = TriMesh(ball.vertices, ball.triangles[:, ::-1].copy())
+    top = float(ball.vertices[:, 2].max())
+    mesh = card(1, curve(9, (0.0, 0.0, top - 0.1)))[0]
+    expected = mesh_strands.on_surface(made(mesh, ball, strand_count=5), ball)
+    found = mesh_strands.on_surface(made(mesh, ball, strand_count=5), inward)
+    assert not np.array_equal(expected.counts, made(mesh, ball, strand_count=5).counts)
+    np.testing.assert_array_equal(found.counts, expected.counts)
+    np.testing.assert_allclose(found.points, expected.points, atol=1e-5)
+
+
 def test_strands_end_where_the_texture_ends():
     """A strand ends at its last opaque point; strands without opaque points are left out."""
     found = made(card(3)[0], strand_count=10)
@@ -221,6 +235,27 @@ def test_strands_scale_with_the_mesh(scale):
     found = made(mesh, strand_count=7)
     np.testing.assert_allclose(scaled.points, found.points * scale, atol=1e-6 * scale)
     np.testing.assert_allclose(scaled.radii, found.radii * scale, rtol=1e-4)
+
+
+def test_places_of_a_large_grid_need_no_solution():
+    """Numbers of edges to opposite sides are the places of a grid, so that solving for means of neighbors ends at once.
+
+    Places between curved sides are means of their neighbors too.
+    """
+    grid = flat_grid(64)
+    edges = np.unique(np.sort(grid.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    is_inner = ((grid.vertices[:, :2] > 0.0) & (grid.vertices[:, :2] < 1.0)).all(axis=1)
+    places = grid.vertices[:, :2].astype(np.float64)
+    start = ribbon_charts._places_between(np.concatenate([edges, edges[:, ::-1]]), is_inner, places)
+    np.testing.assert_allclose(start[is_inner], places[is_inner], atol=1e-12)
+    bent = places**1.3
+    found = ribbon_charts._relaxed(edges, is_inner, bent)
+    sums, counts = np.zeros_like(found), np.zeros((len(found), 1))
+    for first, second in (edges.T, edges.T[::-1]):
+        np.add.at(sums, first, found[second])
+        np.add.at(counts, first, 1.0)
+    np.testing.assert_allclose((sums / counts)[is_inner], found[is_inner], atol=1e-8)
+    np.testing.assert_array_equal(found[~is_inner], bent[~is_inner])
 
 
 def test_a_sculpted_lock_may_have_more_triangles_than_a_body_beside_cards():
