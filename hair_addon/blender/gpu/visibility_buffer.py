@@ -20,8 +20,8 @@ from .surface_shading import white
 
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
-# With fewer segments, occlusion culling takes longer than drawing hidden segments.
-_FEW_SEGMENTS = 1 << 20
+# With fewer, or with shorter segments [samples], occlusion culling takes longer than drawing hidden segments.
+_FEW_SEGMENTS, _SHORT_SEGMENTS = 1 << 20, 2.0 * visibility_programs.TILE
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,20 @@ class _Placed:
 
     @property
     def segment_count(self):
-        points = self.records["drawn_points"].astype(np.int64)
-        return int((self.records["strand_count"] * (points - 1)).sum())
+        """Number of drawn segments."""
+        pieces = self.records["drawn_points"].astype(np.int64) - 1
+        return int((self.records["drawn_strands"] * pieces).sum())
+
+    @property
+    def total_length(self):
+        """Length of all drawn segments as seen from the side [samples]; infinite for hair around the viewer."""
+        records, bounds = self.records, self.batch.strands.bounds
+        middle = np.append(0.5 * bounds.sum(axis=0, dtype=np.float64), 1.0)
+        depths = records["object_to_clip"].transpose(0, 2, 1)[:, 3] @ middle
+        if (depths <= 0.0).any():
+            return np.inf
+        per_unit = records["pixels_per_unit"] * records["object_scale"] / depths
+        return float((records["drawn_strands"] * per_unit).sum() * self.batch.strands.mean_length)
 
     @property
     def run_count(self):
@@ -337,7 +349,9 @@ class VisibilityBuffer:
             {name: placed.view, "lights": placed.lights} | clipping
             for name, placed in zip(names, self._hair, strict=True)
         ]
-        if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
+        count = sum(placed.segment_count for placed in self._hair)
+        length = sum(placed.total_length for placed in self._hair)
+        if count < _FEW_SEGMENTS or length < _SHORT_SEGMENTS * count:
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return

@@ -67,7 +67,8 @@ class View:
         found = self.live.lit(self.drawn, camera, self.count, time.monotonic(), is_followed)
         self._picture.restart(is_moved=True)
         self._picture.add_pass(found, *camera)
-        self._picture._sum.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+        with self._picture._sum.bind():
+            self._picture._sum.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
         return found, time.perf_counter() - started
 
     def picture(self, drawn):

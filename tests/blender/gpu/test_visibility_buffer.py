@@ -261,12 +261,20 @@ def test_hair_outside_of_the_view_is_not_rasterized(shading, rng, monkeypatch):
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch, view_to_clip):
-    """Culling by tiles changes no sample of dense hair, some in front of the near plane and half behind a surface."""
+    """Culling by tiles changes no sample of dense hair, some in front of the near plane and half behind a surface.
+
+    Only segments that are long beside tiles are culled.
+    """
+    buffer_class, culled = visibility_buffer.VisibilityBuffer, []
+    find = buffer_class._find_farthest
+    monkeypatch.setattr(buffer_class, "_find_farthest", lambda buffer: culled.append(1) or find(buffer))
     placed = [(*tuft(rng, 1500, thickness=0.006), np.eye(4)), (*tuft(rng, 40, thickness=0.02), np.eye(4))]
     found = []
-    for few in (1 << 30, 0):
-        monkeypatch.setattr(visibility_buffer, "_FEW_SEGMENTS", few)
+    monkeypatch.setattr(visibility_buffer, "_FEW_SEGMENTS", 0)
+    for short in (1e9, 0.0):
+        monkeypatch.setattr(visibility_buffer, "_SHORT_SEGMENTS", short)
         found.append(drawn(placed, view_to_clip, shading, in_compute=True, hiding_at=0.9))
+        assert len(culled) == (0 if short else 2)
     for all_walked, some_walked in zip(*found, strict=True):
         np.testing.assert_array_equal(all_walked, some_walked)
 

@@ -251,17 +251,19 @@ def resolve_program():
 
 @cached
 def accumulate_program():
-    """Return the program that adds a pass to the picture of a viewport: see picture/accumulate.frag."""
+    """Return the compute program that adds a pass to the picture of a viewport: see picture/accumulate.comp."""
     info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     info.push_constant("INT", "samples_per_side")
+    info.push_constant("INT", "is_first")
     info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [samples]
-    info.push_constant("FLOAT", "weight")
     info.push_constant("FLOAT", "spread")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
     info.sampler(2, "FLOAT_2D", "surface_depth")
-    info.depth_write("ANY")
-    return compile_drawing(info, "picture/cover.vert", "picture/accumulate.frag")
+    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "sums", qualifiers={"READ", "WRITE"})
+    info.image(1, "R32F", "FLOAT_2D", "nearest_depths", qualifiers={"READ", "WRITE"})
+    return compile_compute(info, "picture/accumulate.comp")
 
 
 @cached

@@ -42,8 +42,8 @@ class HairPicture:
         self._view = None  # record of the last pass
         self._pass = VisibilityBuffer(*self._detail.buffer_size)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
-        self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
-        self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
+        self._depth = gpu.types.GPUTexture(self.size, format="R32F")
+        self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color)
 
     @property
     def is_fine(self):
@@ -101,10 +101,7 @@ class HairPicture:
         scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True, clip_planes=clip_planes)
         if is_outlined:
             outline.add_seen(self._pass, self._detail)
-        with self._sum.bind():
-            if self.pass_count == 0:
-                self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-            self._accumulate()
+        self._accumulate()
         self.pass_count += 1
         part_left = 1.0 - self.pass_count / self._pass_total
         light = self._color, self.pass_count
@@ -121,20 +118,17 @@ class HairPicture:
             self._pass = VisibilityBuffer(*detail.buffer_size)
 
     def _accumulate(self):
-        program = scene_programs.accumulate_program()
-        program.bind()
-        program.uniform_int("samples_per_side", self._detail.per_side)
-        program.uniform_int("first_place", self._detail.corner)
         is_shared = self._detail.per_side == 1 and self.pass_count < len(self._spreads)
-        program.uniform_float("spread", self._spreads[self.pass_count] if is_shared else 0.0)
-        program.uniform_sampler("picture", self._pass.color)
-        program.uniform_sampler("depths", self._pass.depths)
-        program.uniform_sampler("surface_depth", self._pass.surface_depth)
-        # Light is added, and the nearest depth is selected.
-        for weight, depth_test in ((1.0, "NONE"), (0.0, "LESS_EQUAL")):
-            program.uniform_float("weight", weight)
-            with drawing.gpu_state(depth_test, depth_writes=depth_test != "NONE", blend="ADDITIVE_PREMULT"):
-                drawing.cover(program)
+        samplers = {"picture": self._pass.color, "depths": self._pass.depths, "surface_depth": self._pass.surface_depth}
+        program = scene_programs.accumulate_program()
+        with drawing.bound(program, {}, samplers):
+            program.image("sums", self._color)
+            program.image("nearest_depths", self._depth)
+            program.uniform_int("samples_per_side", self._detail.per_side)
+            program.uniform_int("first_place", self._detail.corner)
+            program.uniform_int("is_first", int(self.pass_count == 0))
+            program.uniform_float("spread", self._spreads[self.pass_count] if is_shared else 0.0)
+            drawing.dispatch_over(program, self.size)
 
     def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
         """Draw the picture over the bound viewport.
@@ -173,7 +167,8 @@ class HairPicture:
 
     def read(self):
         """Return (height, width, 4) float32: premultiplied linear light, bottom row first."""
-        pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
+        with self._sum.bind():  # a framebuffer has no size before it is bound
+            pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
 
     def read_shown(self):

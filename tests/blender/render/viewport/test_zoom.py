@@ -40,16 +40,22 @@ def summed(light):
 
 
 def fine(picture, drawn, camera):
-    """Return the sums of all passes of a picture, and of the first pass as the mean of sixteen random ones."""
+    """Return the mean sums of all passes of pictures with sixteen passes in all, and of sixteen first passes."""
     picture.restart()
-    firsts = []
+    firsts, lasts = [], []
     for _ in range(16):
         picture.add_pass(drawn, *camera)
         firsts.append(summed(picture.read()))
         picture.restart(is_moved=True)  # the next one has other samples
-    while not picture.is_fine:
-        picture.add_pass(drawn, *camera)
-    return summed(picture.read()), np.mean(firsts, axis=0)
+    count = 0
+    while count < 16:
+        if lasts:
+            picture.restart(is_moved=True)
+        while not picture.is_fine:
+            picture.add_pass(drawn, *camera)
+        lasts.append(summed(picture.read()))
+        count += picture.pass_count
+    return np.mean(lasts, axis=0), np.mean(firsts, axis=0)
 
 
 @even_guides
