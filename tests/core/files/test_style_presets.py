@@ -3,6 +3,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
@@ -12,6 +13,7 @@ from hair_addon.core.grooming.groom import HairSettings
 from hair_addon.core.params import declared
 from hair_addon.core.styling import base, clump, curl
 from hair_addon.core.styling.kinds import LABELS, kind_of
+from tests.support.dynamics.stepped import stepped
 
 
 def lengths(preset):
@@ -51,6 +53,16 @@ def test_wet_belongs_last_and_guides_lean_first(identifier):
     kinds = [kind_of(style) for style in style_presets.read(identifier).styles]
     assert "WET" not in kinds[:-1]
     assert "LEAN" not in kinds[1:]
+
+
+def test_sleek_hair_stays_above_the_scalp():
+    """Strands that lie around the crown of a head, 2.5 mm above its skin, are not smoothed into the skin."""
+    radius, arc = 0.1, np.linspace(0.0, 0.15, 41)  # [m]
+    height = radius + 0.0025 * np.minimum(arc / 0.01, 1.0)
+    strand = np.stack([height * np.sin(arc / radius), 0.0 * arc, height * np.cos(arc / radius)], axis=1)
+    settings = next(style for style in style_presets.read("SLEEK").styles if kind_of(style) == "SMOOTH")
+    made = stepped(strand[None].astype(np.float32), settings)
+    assert np.linalg.norm(made, axis=2).min() > radius - 1e-6
 
 
 @pytest.mark.parametrize("identifier", style_presets.PRESETS)
