@@ -48,7 +48,7 @@ TOOLS = {
 # In the order of the menu. Gather asks for a curve, and no guide is inside the sphere for Push Outside.
 MENU = (*list(TOOLS)[:6], "push_outside", "gather_guides", *list(TOOLS)[6:])
 
-facts |= {"tools": {}, "tubes": {}, "shelf": {}}
+facts |= {"tools": {}, "tubes": {}, "shelf": {}, "brush": {}}
 
 
 def guides():
@@ -199,6 +199,31 @@ def tools():
         yield from use(name)
 
 
+def resized(middle):
+    """Change the radius of the brush by F and a click, and its strength by Shift F and Esc."""
+    brush = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT").operator_properties("vellus.paint_flow")
+    done, values = facts["brush"], {}
+    x, y = (int(value) for value in middle)
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+    yield
+    take_picture(OUT / "brush.png", redraws=2)
+    for name, shift in (("radius", False), ("strength", True)):
+        yield from key("F", shift=shift)
+        values[name] = getattr(brush, name)
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x + 60, y=y)
+        yield from wait(0.2)
+        done[f"{name} moved"] = getattr(brush, name) - values[name]
+        if shift:
+            yield from key("ESC")
+        else:
+            for value in ("PRESS", "RELEASE"):
+                window().event_simulate(type="LEFTMOUSE", value=value, x=x + 60, y=y)
+                yield
+        yield from wait(0.2)
+        done[f"{name} changed"] = getattr(brush, name) - values[name]
+    brush.property_unset("radius")
+
+
 def paint_flow():
     """Paint with the Paint Flow tool in Object Mode: a stroke, the redo panel, undo, and a stroke canceled by Esc."""
     with in_viewport():
@@ -212,6 +237,7 @@ def paint_flow():
     _area, region = viewport()
     middle = np.array([region.x + 0.5 * region.width, region.y + 0.5 * region.height])
     reach = np.array([0.15 * region.height, 0.0])
+    yield from resized(middle)
     for number, _pause in enumerate(drag(middle - reach, middle + reach)):
         yield
         if number == 10:  # the button is still held

@@ -64,9 +64,12 @@ def test_a_groom_that_was_saved_is_in_the_shelf_and_a_click_applies_it(walk):
 
 
 def test_flow_is_painted_by_the_mouse(walk):
-    """A stroke of the tool turns guides while the mouse moves; it is redone, undone and canceled."""
+    """A stroke of the tool turns guides while the mouse moves; it is redone, undone and canceled. F sizes the brush."""
     flow = walk.facts["flow"]
     assert flow["ran"] == "VELLUS_OT_paint_flow" and flow["points"] > 3 and flow["changed"] > 2
     assert flow["in the stroke"][0] > 0.05 and flow["is the same at once"] < 1e-5
     assert flow["radius"] == pytest.approx(1.0)
+    brush = walk.facts["brush"]
+    assert brush["radius moved"] > 0.0 and brush["radius changed"] == brush["radius moved"]
+    assert brush["strength moved"] > 0.0 and brush["strength changed"] == 0.0
     assert flow["without strength"] and flow["is undone"] and flow["is canceled"] and not flow["second stroke"]

@@ -4,6 +4,8 @@
 import bpy
 import numpy as np
 
+from .translations import CONTEXT
+
 
 class VellusStrokePoint(bpy.types.PropertyGroup):
     """A point of a stroke"""
@@ -25,6 +27,22 @@ def read(operator):
 def add(operator, place):
     """Add a point (3,) to the stroke of an operator."""
     operator.stroke.add().location = place
+
+
+def brush_annotations():
+    """Return the property of an operator that changes a setting of a brush."""
+    return {
+        "setting": bpy.props.EnumProperty(
+            name="Setting",
+            description="Setting that the mouse changes",
+            translation_context=CONTEXT,
+            items=[
+                ("radius", "Radius", "Radius of the brush on the surface"),
+                ("strength", "Strength", "Strength of the brush"),
+            ],
+            options={"SKIP_SAVE"},
+        )
+    }
 
 
 CLASSES = (VellusStrokePoint,)

@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import setting_rows
+from . import brush_circle, setting_rows
 
-_OPERATOR = "vellus.paint_flow"
+_OPERATOR, _SIZE = "vellus.paint_flow", "vellus.size_flow_brush"
 PAINT_FLOW = "vellus.paint_flow"
 MODES = ("OBJECT", "SCULPT_CURVES")
 
@@ -15,6 +15,11 @@ def _draw_settings(_context, layout, tool):
     settings = tool.operator_properties(_OPERATOR)
     for name in ("radius", "strength", "lift", "mirrored"):
         setting_rows.row(layout, settings, name)
+
+
+def _draw_cursor(context, tool, xy):
+    """Draw the brush below the mouse."""
+    brush_circle.draw(context, tool.operator_properties(_OPERATOR), xy)
 
 
 def _tool(mode):
@@ -28,8 +33,13 @@ def _tool(mode):
         "bl_icon": "brush.particle.comb",
         "bl_cursor": "CROSSHAIR",
         "bl_operator": _OPERATOR,
-        "bl_keymap": ((_OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),),
+        "bl_keymap": (
+            (_OPERATOR, {"type": "LEFTMOUSE", "value": "PRESS"}, None),
+            (_SIZE, {"type": "F", "value": "PRESS"}, {"properties": [("setting", "radius")]}),
+            (_SIZE, {"type": "F", "value": "PRESS", "shift": True}, {"properties": [("setting", "strength")]}),
+        ),
         "draw_settings": staticmethod(_draw_settings),
+        "draw_cursor": staticmethod(_draw_cursor),
     }
     return type(f"VELLUS_TOOL_paint_flow_{mode.lower()}", (bpy.types.WorkSpaceTool,), members)
 

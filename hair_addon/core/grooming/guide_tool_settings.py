@@ -129,7 +129,7 @@ class AttractSettings(ToolSettings):
     )
     clearance: float = param(
         0.002,
-        "Height of guides above the surface, which they reach shortly after their roots",
+        "Distance between attracted guides and the surface, reached near their roots",
         low=0.0,
         high=1e3,
         soft_high=0.1,
@@ -144,7 +144,7 @@ class FlowSettings(ToolSettings):
 
     radius: float = param(
         0.03,
-        "Distance from the stroke within which guides turn; the effect fades toward it",
+        "Radius of the brush on the surface; guides near its edge turn less",
         above=0.0,
         high=1e6,
         soft_high=1.0,
@@ -153,7 +153,7 @@ class FlowSettings(ToolSettings):
     )
     strength: float = param(
         0.5,
-        "How fast guides turn toward the stroke; at 1 those below it turn completely",
+        "How far guides turn with each stroke; at 1, guides below the brush turn completely",
         low=0.0,
         high=1.0,
         subtype="FACTOR",
@@ -174,7 +174,7 @@ class OutsideSettings(ToolSettings):
 
     clearance: float = param(
         0.0,
-        "Distance from the surface that guides keep at least",
+        "Minimum distance between guides and the surface",
         low=0.0,
         high=1e3,
         soft_high=0.1,

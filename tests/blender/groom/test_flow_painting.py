@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paint Flow turns guides along strokes on the surface as it is posed, and keeps them outside of it."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from bpy_extras import view3d_utils
+from mathutils import Matrix, Vector
 
 from hair_addon import api
-from hair_addon.blender.ui import tools
+from hair_addon.blender.groom.guides import flow_painting
+from hair_addon.blender.ui import brush_circle, tools
 from hair_addon.core.errors import HairError
 from tests.support.interface.layout import draw, redo_panel
 from tests.support.reading import evaluated_points, points
@@ -157,6 +161,34 @@ def test_the_api_paints_as_the_operator_does(guides):
         api.paint_flow(guides, arc()[:1])
     with pytest.raises(HairError, match="non-finite"):
         api.paint_flow(guides, np.full((3, 3), np.nan))
+
+
+@pytest.mark.parametrize("place", [Matrix.Scale(0.01, 4), Matrix.Diagonal((2.0, -0.5, 1.0, 1.0))])
+def test_the_circle_of_the_brush_lies_on_the_surface(guides, place):
+    """The points of the circle are at its radius in the world, in the plane of the surface as it is scaled."""
+    surface = guides.data.surface
+    surface.matrix_world = Matrix.Translation((1.0, 2.0, 3.0)) @ place
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    above, middle = (surface.matrix_world @ Vector((0.3, 0.2, height)) for height in (2.0, 0.0))
+    ring = flow_painting.brush_circle(surface, above, middle - above, 0.7, depsgraph)
+    hit = flow_painting.place_on(surface, above, middle - above, depsgraph)
+    _hit, _place, normal, _face = surface.evaluated_get(depsgraph).closest_point_on_mesh(hit)
+    from_middle = ring - np.array(surface.matrix_world @ Vector(hit))
+    np.testing.assert_allclose(np.linalg.norm(from_middle, axis=1), 0.7, rtol=1e-5)
+    outward = np.array(surface.matrix_world.inverted().transposed().to_3x3() @ normal)
+    np.testing.assert_allclose(from_middle @ outward / np.linalg.norm(outward), 0.0, atol=2e-2)
+    assert flow_painting.brush_circle(surface, above, above - middle, 0.7, depsgraph) is None
+
+
+def test_the_circle_is_drawn_where_the_view_shows_it():
+    """Points of the world have the places of the window in which Blender's own projection shows them."""
+    view = SimpleNamespace(perspective_matrix=Matrix(((1.2, 0, 0, 0), (0, 2.1, 0, 0), (0, 0, -1, -2), (0, 0, -1, 0))))
+    region = SimpleNamespace(width=300, height=200, x=20, y=10)
+    points = np.array([(0.1, 0.2, -3.0), (-1.0, 0.4, -2.0)])
+    expected = [view3d_utils.location_3d_to_region_2d(region, view, Vector(p)) + Vector((20, 10)) for p in points]
+    np.testing.assert_allclose(brush_circle.in_window(points, region, view), expected, rtol=1e-6)
+    assert brush_circle.in_window(points * (1.0, 1.0, -1.0), region, view) is None
 
 
 def test_the_tool_is_offered_in_its_modes(guides):

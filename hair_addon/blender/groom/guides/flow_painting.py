@@ -14,6 +14,8 @@ from . import guide_tools, outside_guides
 _MIRROR = np.array([-1.0, 1.0, 1.0])  # along the local X axis
 _PROBE = 1e-2  # length of the probe that carries directions to rest, relative to the radius
 _MOST_POINTS = 10_000  # of a stroke
+_PART = 0.12  # default radius as a fraction of the size of the surface
+_CIRCLE = 64  # points of the brush's circle
 
 
 class FlowStroke:
@@ -101,13 +103,50 @@ def paint(datablock: Curves, stroke: np.ndarray, settings: FlowSettings, depsgra
     if len(stroke) < 2:
         raise HairError("The stroke has no length: drag over the surface.")
     if len(stroke) > _MOST_POINTS:
-        raise HairError("The stroke has {count} points, too many: paint shorter strokes.", count=len(stroke))
+        raise HairError(
+            "A stroke can have at most {most} points, not {count}: paint shorter strokes.",
+            most=_MOST_POINTS,
+            count=len(stroke),
+        )
     return FlowStroke(datablock, settings, depsgraph).extend(stroke)
 
 
 def place_on(surface: Object, origin: np.ndarray, direction: np.ndarray, depsgraph: Depsgraph) -> np.ndarray | None:
     """Return where a ray in world coordinates first hits a posed surface, (3,) in its local coordinates, or None."""
+    found = _hit(surface, origin, direction, depsgraph)
+    return None if found is None else found[0]
+
+
+def brush_circle(
+    surface: Object, origin: np.ndarray, direction: np.ndarray, radius: float, depsgraph: Depsgraph
+) -> np.ndarray | None:
+    """Return points (N, 3) of the brush's circle where a ray first hits a posed surface, in world coordinates, or None.
+
+    radius: of the brush in world coordinates. The circle lies in the plane of the surface.
+    """
+    found = _hit(surface, origin, direction, depsgraph)
+    if found is None:
+        return None
+    to_world = np.array(surface.matrix_world)
+    middle = to_world[:3, :3] @ found[0] + to_world[:3, 3]
+    normal = np.linalg.pinv(to_world[:3, :3]).T @ found[1]
+    length = np.linalg.norm(normal)
+    if not length > 0.0:
+        return None
+    across = np.linalg.svd(normal[None] / length)[2][1:]  # two unit vectors in the plane
+    turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE, endpoint=False)[:, None]
+    return middle + radius * (np.cos(turn) * across[0] + np.sin(turn) * across[1])
+
+
+def default_radius(datablock: Curves) -> float | None:
+    """Return the radius of a brush [m] that fits the surface of guides; None without a surface."""
+    size = guide_tools.surface_size(datablock)
+    return _PART * size if size else None
+
+
+def _hit(surface, origin, direction, depsgraph):
+    """Return (place, normal) where a ray in world coordinates first hits a surface, in its coordinates, or None."""
     to_local = surface.matrix_world.inverted_safe()
     start = to_local @ origin
-    is_hit, place, _normal, _face = surface.evaluated_get(depsgraph).ray_cast(start, to_local.to_3x3() @ direction)
-    return np.array(place) if is_hit else None
+    is_hit, place, normal, _face = surface.evaluated_get(depsgraph).ray_cast(start, to_local.to_3x3() @ direction)
+    return (np.array(place), np.array(normal)) if is_hit else None

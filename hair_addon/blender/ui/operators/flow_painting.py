@@ -7,14 +7,17 @@ from bpy_extras import view3d_utils
 
 from ....core.errors import HairError, memory_as_sentence
 from ....core.grooming.guide_tool_settings import FlowSettings
-from ...groom.guides import flow_painting, guide_tools
+from ...groom.guides import flow_painting
 from ...groom.selection import guides_of
+from ...host.notices import name_of
 from ...settings import setting_properties, strokes
+from ...settings.translations import CONTEXT
 from .guide_tools import GuideTool
 
 _TOOL = "vellus.paint_flow"
-_PART = 0.12  # default radius as a fraction of the size of the surface
 _SPACING = 0.05  # least distance between points of a stroke, relative to the radius
+_OCTAVE = 150.0  # movement of the mouse that doubles the radius [pixels]
+_RANGE = 300.0  # movement of the mouse from no strength to full strength [pixels]
 
 
 class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
@@ -27,20 +30,22 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(FlowSettings) | strokes.annotations()
 
     def prefill(self, guides):
-        size = guide_tools.surface_size(guides)
-        if size and not self.properties.is_property_set("radius"):
-            self.radius = _PART * size
+        radius = flow_painting.default_radius(guides)
+        if radius and not self.properties.is_property_set("radius"):
+            self.radius = radius
 
     def invoke(self, context, event):
         """Begin a stroke where the mouse is pressed on the surface; elsewhere Blender handles the event."""
         guides = guides_of(context.object)
         self._surface = guides.surface
+        if self._surface is None:
+            return self.refuse(HairError('"{name}" has no surface: attach the guides to a mesh.', name=name_of(guides)))
         place = self._place_of(context, event)
         if place is None:
             return {"PASS_THROUGH"}
         self.prefill(guides)
-        tool = context.workspace.tools.from_space_view3d_mode(context.mode)
-        if tool is not None and tool.idname == _TOOL:
+        tool = _active_tool(context)
+        if tool is not None:
             tool.operator_properties(_TOOL).radius = self.radius  # shown in the header
         self.stroke.clear()
         try:
@@ -91,7 +96,7 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
     def _place_of(self, context, event):
         """Return the place (3,) on the surface below the mouse, in its local coordinates, or None."""
         region, view = context.region, context.region_data
-        if self._surface is None or region is None or view is None:
+        if region is None or view is None:
             return None
         mouse = event.mouse_region_x, event.mouse_region_y
         origin = view3d_utils.region_2d_to_origin_3d(region, view, mouse)
@@ -99,4 +104,55 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
         return flow_painting.place_on(self._surface, origin, direction, context.evaluated_depsgraph_get())
 
 
-CLASSES = (VELLUS_OT_paint_flow,)
+class VELLUS_OT_size_flow_brush(bpy.types.Operator):
+    """Change the radius or the strength of Paint Flow by moving the mouse sideways"""
+
+    bl_idname = "vellus.size_flow_brush"
+    bl_label = "Size Flow Brush"
+    bl_options = {"REGISTER", "INTERNAL", "BLOCKING"}
+    bl_translation_context = CONTEXT
+    __annotations__ = strokes.brush_annotations()
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Choose the tool Paint Flow in a 3D viewport.")
+        return context.region_data is not None and _active_tool(context) is not None
+
+    def invoke(self, context, event):
+        """Begin with the present value."""
+        brush = _active_tool(context).operator_properties(_TOOL)
+        guides = guides_of(context.object)
+        radius = None if guides is None else flow_painting.default_radius(guides)
+        if radius and not brush.is_property_set("radius"):
+            brush.radius = radius
+        self._brush, self._before, self._start = brush, getattr(brush, self.setting), event.mouse_x
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Change the value while the mouse moves; Esc and the right button restore it."""
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            return self._end(context, self._before, {"CANCELLED"})
+        if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"} and event.value == "PRESS":
+            return self._end(context, getattr(self._brush, self.setting), {"FINISHED"})
+        if event.type == "MOUSEMOVE":
+            moved = (event.mouse_x - self._start) / context.preferences.system.ui_scale
+            is_radius = self.setting == "radius"
+            value = self._before * 2.0 ** (moved / _OCTAVE) if is_radius else self._before + moved / _RANGE
+            setattr(self._brush, self.setting, value)
+            context.area.tag_redraw()  # the circle, and the header with the value
+        return {"RUNNING_MODAL"}
+
+    def _end(self, context, value, result):
+        setattr(self._brush, self.setting, value)
+        context.area.tag_redraw()
+        return result
+
+
+def _active_tool(context):
+    """Return the active tool if it is Paint Flow, else None."""
+    tool = context.workspace.tools.from_space_view3d_mode(context.mode)
+    return tool if tool is not None and tool.idname == _TOOL else None
+
+
+CLASSES = (VELLUS_OT_paint_flow, VELLUS_OT_size_flow_brush)
