@@ -108,13 +108,13 @@ BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/picture/history_blocks.glsl
 
 @shaders.cached
 def blocks_program():
-    """Return the program for the mean and deviation of each block of pixels: see picture/history_blocks.frag."""
-    return _filter("picture/history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
+    """Return the compute program of the mean and deviation of blocks of pixels: see picture/history_blocks.comp."""
+    return _filter("picture/history_blocks.comp", ("picture",), BLOCK_IMAGES, ("weight",))
 
 
 @shaders.cached
 def carry_program():
-    """Return the program that reprojects the previous picture: see picture/history_carry.frag."""
+    """Return the compute program that reprojects the previous picture: see picture/history_carry.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
@@ -124,23 +124,32 @@ def carry_program():
     of_light = ("light_before", "light_now")
     for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion", *of_light), start=2):
         info.sampler(slot, "FLOAT_2D", name)
-    return shaders.compile_drawing(info, "picture/history_carry.vert", "picture/history_carry.frag", _PICTURE)
+    return _written(info, "picture/history_carry.comp", CARRIED_IMAGES)
 
 
 @shaders.cached
 def mix_program():
-    """Return the program that blends reprojected pixels with the passes so far: see picture/history_mix.frag."""
+    """Return the compute program that blends reprojected pixels with the passes: see picture/history_mix.comp."""
     samplers = ("sums", "carried", "carried_passes")
-    return _filter("picture/history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
+    return _filter("picture/history_mix.comp", samplers, CARRIED_IMAGES, ("weight", "pass_count", "part_left"))
 
 
-_PICTURE = (("color", "VEC4"), ("passes", "FLOAT"))
+# Images (name, format) that the programs of a history write.
+CARRIED_IMAGES = (("colors", "RGBA16F"), ("weights", "R16F"))
+BLOCK_IMAGES = (("means", "RGBA16F"), ("deviations", "RGBA16F"))
 
 
-def _filter(fragment, samplers, targets, constants):
+def _filter(file, samplers, images, constants):
     info = gpu.types.GPUShaderCreateInfo()
     for name in constants:
         info.push_constant("FLOAT", name)
     for slot, name in enumerate(samplers):
         info.sampler(slot, "FLOAT_2D", name)
-    return shaders.compile_drawing(info, "picture/cover.vert", fragment, targets)
+    return _written(info, file, images)
+
+
+def _written(info, file, images):
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
+    for slot, (name, texture_format) in enumerate(images):
+        info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})
+    return shaders.compile_compute(info, file)

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ...gpu import drawing, strand_textures
+from ...gpu import drawing
 from ...gpu.programs import picture_programs, uniforms
 from .. import motion_vectors
-
-_COLOR, _PASSES = "RGBA16F", "R16F"
 
 # Maximum weight of the last picture in passes: of the same strands, and of others, whose noise would hide changes.
 _MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
@@ -23,32 +21,25 @@ _MOST_OF_STILL = 96.0  # if only lights have moved: the picture is not blurred, 
 
 
 class _Targets:
-    """Textures and a framebuffer, which does not own them."""
+    """Textures that a program fills. images: (name, format) of `picture_programs` of each."""
 
-    def __init__(self, size, formats, is_smooth):
-        self.size = size
-        self.textures = [gpu.types.GPUTexture(size, format=one) for one in formats]
+    def __init__(self, size, images):
+        self.size, self._names = size, [name for name, _format in images]
+        self.textures = [gpu.types.GPUTexture(size, format=one) for _name, one in images]
         for texture in self.textures:
-            texture.filter_mode(is_smooth)
+            texture.filter_mode(True)
             texture.extend_mode("EXTEND")
             texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
-        self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures))
 
-    def fill(self, program, samplers, **constants):
-        """Run a program on every texel; constants: numbers."""
-        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
-            with drawing.bound(program, {}, samplers):
-                for name, value in constants.items():
-                    program.uniform_float(name, value)
-                drawing.cover(program)
-
-    def draw(self, batch, program, samplers, blocks):
-        """Clear the textures and draw a batch; blocks: {instance: record}."""
-        blocks = {name: uniforms.uniform_buffer(record) for name, record in blocks.items()}
-        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
-            self._framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
-            with drawing.bound(program, blocks, samplers):
-                batch.draw(program)
+    def fill(self, program, samplers, blocks=None, **constants):
+        """Run a compute program for every texel; blocks: {instance: record}; constants: numbers."""
+        blocks = {name: uniforms.uniform_buffer(record) for name, record in (blocks or {}).items()}
+        with drawing.bound(program, blocks, samplers):
+            for name, texture in zip(self._names, self.textures, strict=True):
+                program.image(name, texture)
+            for name, value in constants.items():
+                program.uniform_float(name, value)
+            drawing.dispatch_over(program, self.size)
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,7 @@ class History:
     def __init__(self, size):
         self.size = size
         self._shown = self._before = None  # _Targets: the picture, and its weight in passes
-        self._carried = self._blocks = self._block_batch = None
+        self._carried = self._blocks = None
         self._seen = None
         self._is_carried = False
         self._relit = None  # _Targets: blocks of samples with the former lights, and with the current lights
@@ -110,11 +101,10 @@ class History:
         self._shown, self._before = self._before, self._shown
 
     def _allocate(self):
-        formats = (_COLOR, _PASSES)
-        self._shown, self._before, self._carried = (_Targets(self.size, formats, True) for _ in range(3))
+        images = picture_programs.CARRIED_IMAGES
+        self._shown, self._before, self._carried = (_Targets(self.size, images) for _ in range(3))
         blocks = tuple(-(-length // picture_programs.BLOCK_SIDE) for length in self.size)
-        self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
-        self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
+        self._blocks = [_Targets(blocks, picture_programs.BLOCK_IMAGES) for _ in range(2)]
 
     def follow_light(self, drawn, camera, buffer, relight):
         """Measure the change of light in the last pass if only lights have moved in a `DrawnScene`.
@@ -127,7 +117,7 @@ class History:
             return
         size = tuple(-(-length // picture_programs.BLOCK_SIDE) for length in buffer.size)
         if self._relit is None or self._relit[0].size != size:
-            self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
+            self._relit = [_Targets(size, picture_programs.BLOCK_IMAGES) for _ in range(2)]
         program = picture_programs.blocks_program()
         self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
         self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
@@ -187,7 +177,7 @@ class History:
             "depths": buffer.nearest_depths(),
             "segments": buffer.segments,
         }
-        self._carried.draw(self._block_batch, picture_programs.carry_program(), samplers, {"history": record})
+        self._carried.fill(picture_programs.carry_program(), samplers, {"history": record})
 
     def _mix(self, light, pass_count, part_left):
         sums, weight = light

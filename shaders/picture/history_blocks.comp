@@ -5,7 +5,11 @@
 
 void main()
 {
-  ivec2 corner = ivec2(gl_FragCoord.xy) * BLOCK_SIDE;
+  ivec2 block = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(block, imageSize(means)))) {
+    return;
+  }
+  ivec2 corner = block * BLOCK_SIDE;
   ivec2 end = min(corner + BLOCK_SIDE, textureSize(picture, 0));
   vec4 sum = vec4(0.0);
   vec4 squares = vec4(0.0);
@@ -19,8 +23,9 @@ void main()
   }
   vec2 extent = vec2(end - corner);
   float count = extent.x * extent.y;
-  mean = sum / count;
-  deviation = sqrt(max(squares / count - mean * mean, vec4(0.0)));
+  vec4 mean = sum / count;
+  vec4 deviation = sqrt(max(squares / count - mean * mean, vec4(0.0)));
   // Smaller deviations are rounding, not noise.
-  deviation *= step(1e-3 * abs(mean) + 1e-6, deviation);
+  imageStore(means, block, mean);
+  imageStore(deviations, block, deviation * step(1e-3 * abs(mean) + 1e-6, deviation));
 }

@@ -121,20 +121,29 @@ bool is_near_hair(ivec2 pixel)
   return is_found;
 }
 
-void main()
+// Whether a block, or any block beside it, has noise: elsewhere the history would not reduce flicker.
+bool has_noise(ivec2 block)
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  vec4 noise = vec4(0.0);
+  for (int turn = 0; turn < 4; turn++) {
+    noise += textureLod(now_deviation, vec2(block + ivec2(turn & 1, turn >> 1)) / vec2(textureSize(now_deviation, 0)), 0.0);
+  }
+  return noise != vec4(0.0);
+}
+
+// The previous picture at a pixel; passes: its weight, 0 for none.
+vec4 carried_light(ivec2 pixel, out float passes)
+{
   ivec2 blocks = textureSize(now_mean, 0);
   vec2 here = block_place(vec2(pixel) + 0.5, blocks);
   vec4 mean = textureLod(now_mean, here, 0.0);
-  color = vec4(0.0);
   passes = 0.0;
   bool is_still = history.is_still != 0;
   bool is_background = false;
   bool is_hair_alone = is_still && (history.has_lit_surfaces == 0 || is_near_hair(pixel));
   vec2 place = is_still ? vec2(pixel) + 0.5 : place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
-    return;
+    return vec4(0.0);
   }
   vec2 there = block_place(place, blocks);
   vec4 mean_before = textureLod(before_mean, there, 0.0);
@@ -167,9 +176,24 @@ void main()
   light *= is_hair_alone ? vec4(factor.rgb, 1.0) : factor;
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
-  color = light;
   passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
   float most_passes = (is_still && !is_hair_alone) ? MOST_OF_LIT_SURFACE : history.most_passes;
   passes = min(passes, is_background ? MOST_OF_BACKGROUND : most_passes) / max(0.5 * most, 1.0);
   passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
+  return light;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(pixel, imageSize(colors)))) {
+    return;
+  }
+  float passes = 0.0;
+  vec4 light = vec4(0.0);
+  if (has_noise(pixel / BLOCK_SIDE)) {
+    light = carried_light(pixel, passes);
+  }
+  imageStore(colors, pixel, light);
+  imageStore(weights, pixel, vec4(passes));
 }
