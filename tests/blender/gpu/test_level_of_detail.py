@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Level of detail: distant hair is drawn with a subset of strands, spread over all of them."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -10,7 +11,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures
 from hair_addon.blender.gpu.programs import uniforms
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render import drawn_scene, motion_vectors
 from hair_addon.blender.render.viewport import hair_picture
 from tests.support.pairs import share_of
 from tests.support.pictures import glsl
@@ -177,19 +178,60 @@ def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     np.testing.assert_allclose(some, picture(), rtol=0.06)
 
 
-def test_hair_with_fewer_points_is_as_bright_as_with_all(thin, monkeypatch):
-    """Strands that bend around a head have their light in place, also where fewer points draw them deeper in the hair.
-
-    With the light of the drawn place, hair with nine points was darker by 5 of 255.
-    """
-    monkeypatch.setattr(hair_picture, "SAMPLE_COUNT", 8)
-    guides, thin.data.vellus.hair.strand_count = bpy.data.objects["Guides"], 15_000
+def bend_around():
+    """Bend the guides around the head."""
+    guides = bpy.data.objects["Guides"]
     bent = points(guides)
     turns = 2.0 * np.linspace(0.0, 1.0, bent.shape[1]) ** 2
     across, along = bent[..., 0].copy(), bent[..., 1].copy()
     bent[..., 0] = np.cos(turns) * across - np.sin(turns) * along
     bent[..., 1] = np.sin(turns) * across + np.cos(turns) * along
     write_points(guides, bent)
+
+
+def test_strands_of_a_reduced_hair_have_the_motion_of_their_own_place(thin, monkeypatch):
+    """Motion vectors [pixels] of hair that turns, drawn with half of its strands and nine points each, are right.
+
+    They are those of the place in each sample, up to the distance of a strand from the line that is drawn for it.
+    """
+    bend_around()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+    monkeypatch.setattr(level_of_detail, "steps_of", lambda _hair, _view: [drawing.Steps(9, 2000)])
+    camera, picture = seen_from(5.0), hair_picture.HairPicture((SIZE, SIZE), 1)
+    picture.add_pass(drawn, *camera)
+    now = motion_vectors.places(drawn, *camera)
+    cosine, sine = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
+    turn = np.array([[cosine, -sine, 0, 0], [sine, cosine, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+    before = {owner: (one[0], one[1], turn @ one[2], one[3]) for owner, one in now.hair.items()}
+    moments = motion_vectors.Motion(replace(now, hair=before), now, now, (SIZE, SIZE))
+    buffer, detail = picture._pass, picture._detail
+    texture = motion_vectors.draw(drawn, moments, picture._view, buffer, has_surfaces=False)
+    width, height = buffer.size
+    found = np.array(texture.read(), np.float32).reshape(height, width, 4)[..., :2]
+    segments = np.array(buffer.segments.read(), np.int64).reshape(height, width)
+    depths = np.array(buffer.depths.read(), np.int64).astype(np.uint32).view(np.float32).reshape(height, width)
+    rows, columns = np.nonzero(segments < 4000 * 8)
+    left, bottom = detail.corner
+    at = np.stack([columns + left, rows + bottom], axis=1) + 0.5
+    size = detail.per_side * SIZE
+    to_clip = camera[1] @ camera[0]
+    clip = np.column_stack([2.0 * at / size - 1.0, 2.0 * depths[rows, columns] - 1.0, np.ones(len(at))])
+    world = clip @ np.linalg.inv(to_clip).T
+    moved = world @ (to_clip @ turn).T
+    expected = 0.5 * SIZE * (moved[:, :2] / moved[:, 3:] - clip[:, :2])
+    errors = np.linalg.norm(found[rows, columns] - expected, axis=1)
+    assert len(errors) > 1000 and np.linalg.norm(expected, axis=1).mean() > 0.5
+    assert errors.mean() < 0.03 and errors.max() < 0.4
+
+
+def test_hair_with_fewer_points_is_as_bright_as_with_all(thin, monkeypatch):
+    """Strands that bend around a head have their light in place, also where fewer points draw them deeper in the hair.
+
+    With the light of the drawn place, hair with nine points was darker by 5 of 255.
+    """
+    monkeypatch.setattr(hair_picture, "SAMPLE_COUNT", 8)
+    thin.data.vellus.hair.strand_count = 15_000
+    bend_around()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
     assert drawn.hair[0][0].point_count > 9
     colors = []
