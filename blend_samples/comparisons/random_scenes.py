@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes drawn at random, by Cycles and by Vellus: python blend_samples/comparisons/random_scenes.py --seeds 0 30.
 
-Prints each scene with the ratio of its hair's mean color (Vellus / Cycles, channel by channel) and the structural
-similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
-distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
-scattering. Cycles' pictures are kept in --references with the extent of their hair: another run, on any machine,
-renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds; with
---pictures they can share those of Vellus too.
+Prints each scene with the ratio of its hair's mean color (Vellus / Cycles, channel by channel), the structural
+similarity, and the error of the means of 12 × 12 pixels in display levels of 255, then the distribution; writes
+worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and distribution.png, the part of the scenes up to
+each deviation, with --dual beside that of a scenes.json by dual scattering. Cycles' pictures are kept in --references
+with the extent of their hair: another run, on any machine, renders only what changed. --references-only renders them
+and nothing else, so that processes can share the seeds; with --pictures they can share those of Vellus too.
 """
 
 import argparse
@@ -73,6 +73,7 @@ def main():
             "ratio": picture_pairs.ratio(reference, picture).round(4).tolist(),
             "deviation": picture_pairs.deviation(reference, picture),
             "structure": picture_pairs.structure(reference, picture),
+            "blocks": picture_pairs.block_error(reference, picture),
             "coverage": float(picture[..., 3].sum() / reference[..., 3].sum()),
             "cycles": picture_pairs.mean(reference).round(5).tolist(),
             "seconds": time.process_time() - started,
@@ -197,20 +198,21 @@ def line(row):
     lights = " ".join(light["kind"].lower() for light in values["lights"]) or "no light"
     ratios = " ".join(f"{value:5.2f}" for value in row["ratio"])
     return (
-        f"{values['seed']:4}  {ratios}  structure {row['structure']:.3f}  {values['body']}: {hair}; {lights}, "
-        f"{values['world']['kind']} world"
+        f"{values['seed']:4}  {ratios}  structure {row['structure']:.3f}  blocks {row['blocks']:5.2f}  "
+        f"{values['body']}: {hair}; {lights}, {values['world']['kind']} world"
     )
 
 
 def summary(rows):
     """Return the distribution of the largest deviations in a channel."""
     deviations = np.array([row["deviation"] for row in rows])
-    structures = np.array([row["structure"] for row in rows])
+    structures, blocks = (np.array([row[name] for row in rows]) for name in ("structure", "blocks"))
     return (
         f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, "
         f"within 15 % {np.mean(deviations < 0.15):.0%}, "
         f"median {np.median(deviations):.1%}, worst {deviations.max():.0%}; "
-        f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}"
+        f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}; "
+        f"blocks median {np.nanmedian(blocks):.2f}, worst {np.nanmax(blocks):.2f}"
     )
 
 

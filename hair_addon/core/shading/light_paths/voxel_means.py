@@ -14,7 +14,7 @@ wp.set_module_options({"enable_backward": False})
 
 # RGB of four sums: light of paths, and the same in uniform light; drawn light, and the same in uniform light.
 CHANNELS = 12
-_PRIOR = 512.0  # weight of the ratio of larger voxels, in paths
+_PRIOR = 128.0  # weight of the ratio of larger voxels, in paths
 _LEAST_VOXELS = 4096  # fewer are not worth a thread
 _MOST_PARTS = 512  # maximum number of parts of a sum
 

@@ -78,7 +78,7 @@ def turned(camera, degrees):
 
 
 def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
-    """At rest the light of blocks of pixels equals that of renders within 3 % of the mean.
+    """At rest the light of blocks of pixels equals that of renders within 4 % of the mean.
 
     Dual scattering differs by more.
     """
@@ -89,7 +89,7 @@ def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
         blocks(picture_of(one, camera)) for one in (found, light_paths.with_grid(drawn, *camera, 4 * PATHS), drawn)
     )
     scale = render.mean()
-    assert np.abs(live - render).mean() < 0.03 * scale
+    assert np.abs(live - render).mean() < 0.04 * scale
     assert np.abs(dual - render).mean() > 0.06 * scale
 
 

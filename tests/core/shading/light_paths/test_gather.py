@@ -466,6 +466,19 @@ def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
     assert there.std(axis=(0, 1)).max() < 0.05
 
 
+def test_light_does_not_leak_past_the_edge_of_a_shadow(rng):
+    """Light of 32 noisy paths per voxel falls below 5 % within four voxels of an edge, with a third of their noise."""
+    side, paths, relative_variance = 16, 32, 25.0
+    is_lit = np.broadcast_to((np.arange(side) >= 7)[:, None], (side, side, side, 1))
+    even = np.ones((side, side, side, 3))
+    light = even * is_lit * rng.gamma(paths / relative_variance, relative_variance / paths, is_lit.shape)
+    found = voxel_means.smooth_ratios(by_voxel(np.concatenate([light, even], axis=-1)), paths * side**3)
+    assert found[:, :, :4].mean(axis=(0, 1)).max() < 0.05
+    assert found[:, :, 10:].mean(axis=(0, 1)).min() > 0.9
+    assert found.mean() == pytest.approx(light.mean(), rel=0.05)
+    assert np.square(found - is_lit).mean() < np.square(light - is_lit).mean() / 9.0
+
+
 def test_hair_has_the_same_light_in_a_grid_of_more_hair(rng):
     """Voxels around a hair's own, which other hair needs, do not change what its own have."""
     sums = rng.exponential(size=(4, 6, 5, 12))
