@@ -24,7 +24,7 @@ const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) ALWAYS
 };
 // The row of a course of the step, by its place in `COURSES`; -1: none. Values of a row.
 const auto course_row = [&](int slot) {
-  return ((packed_courses >> (slot * COURSE_BITS)) & ((1 << COURSE_BITS) - 1)) - 1;
+  return HAS_COURSES == 0 ? -1 : ((packed_courses >> (slot * COURSE_BITS)) & ((1 << COURSE_BITS) - 1)) - 1;
 };
 const auto course_sample = [&](int row, const ints& at) {
   const float* const samples = courses.data + size_t(row) * COURSE_SAMPLES;
