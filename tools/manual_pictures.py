@@ -89,7 +89,7 @@ def start():
         save_sample(folder / "head.blend")
     arguments = [extension, folder / "head.blend", *sys.argv[1:]]
     log = folder / "log.txt"
-    status = blender.run(__file__, arguments, profile=folder, limit=500, size=WINDOW_SIZE, log=log)
+    status = blender.run(__file__, arguments, profile=folder, limit=1500, size=WINDOW_SIZE, log=log)
     errors = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("Traceback")]
     return status or (f"{len(errors)} errors, see {log}" if errors else 0)
 
