@@ -3,6 +3,7 @@
 
 import contextlib
 import io
+import mmap
 import re
 from pathlib import Path
 
@@ -69,11 +70,11 @@ _FORMATS = {
 # Formats whose importers can crash Blender on damaged files despite all checks.
 _MAY_CRASH_BLENDER = {".ply", ".usd", ".usdc", ".usda", ".usdz", ".abc", ".glb", ".gltf", ".vrm", ".fbx"}
 
-# The property UpAxis of an FBX file, binary or text, and the part of the file that contains it. 1 is Y, 2 is Z.
+# The property UpAxis of an FBX file, binary or text; files of version 6 lack its second type. 1 is Y, 2 is Z.
 _FBX_UP = re.compile(
-    rb'UpAxisS\x03\0\0\0intS\x07\0\0\0IntegerS\0\0\0\0I(....)|"UpAxis", *"int", *"Integer", *"", *(\d)', re.DOTALL
+    rb'UpAxisS\x03\0\0\0int(?:S\x07\0\0\0Integer)?S\0\0\0\0I(....)|"UpAxis", *"int"(?:, *"Integer")?, *"", *(\d)',
+    re.DOTALL,
 )
-_FBX_START = 1 << 20  # bytes
 
 # Files without axes and units: read in meters.
 _WITHOUT_UP_AXIS = {".obj", ".ply", ".stl"}
@@ -168,15 +169,20 @@ def _open_blend(path, runs_scripts):
 def _is_y_up(path, ending):
     """Return whether Y points up: in glTF by specification, in Alembic by convention; USD and FBX store the axis."""
     if ending == ".fbx":
-        with path.open("rb") as file:
-            stored = _FBX_UP.search(file.read(_FBX_START))
-        return stored is None or (stored[1] or stored[2])[:1] in (b"1", b"\x01")
+        return not path.stat().st_size or _is_y_up_in_fbx(path)
     if not ending.startswith(".usd"):
         return True
     bpy.utils.expose_bundled_modules()
     from pxr import Usd, UsdGeom
 
     return UsdGeom.GetStageUpAxis(Usd.Stage.Open(str(path), Usd.Stage.LoadNone)) == UsdGeom.Tokens.y
+
+
+def _is_y_up_in_fbx(path):
+    # Files of version 6 have the property after all objects.
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        stored = _FBX_UP.search(content)
+        return stored is None or (stored[1] or stored[2])[:1] in (b"1", b"\x01")
 
 
 def blocked_scripts():

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.io.mesh_files import _is_y_up
 from tests.support.commands import TETRAHEDRON, distance_to, load, run_here, write_obj
 from tests.support.pairs import pairs
 
@@ -294,3 +295,20 @@ def test_strands_are_where_the_surface_is_in_its_frame(arm, scene, tmp_path):
     evaluated.to_mesh_clear()
     assert np.ptp(vertices[:, 0]) < 3.5  # it is bent
     assert distance_to(roots, vertices, triangles).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("stored", "is_y"),
+    [
+        (b'Property: "UpAxis", "int", "",1', True),
+        (b'Property: "UpAxis", "int", "",2', False),
+        (b'P: "UpAxis", "int", "Integer", "",2', False),
+        (b"S\x06\0\0\0UpAxisS\x03\0\0\0intS\0\0\0\0I\x02\0\0\0", False),
+        (b"S\x06\0\0\0UpAxisS\x03\0\0\0intS\x07\0\0\0IntegerS\0\0\0\0I\x02\0\0\0", False),
+    ],
+)
+def test_the_up_axis_of_fbx_files_of_version_6_and_7(tmp_path, stored, is_y):
+    """Files of version 6 state the axis after all objects and without its second type; others at their start."""
+    path = tmp_path / "a.fbx"
+    path.write_bytes(b"; FBX 6.1.0 project file\n" + bytes(3 << 20) + stored + b"\n")
+    assert _is_y_up(path, ".fbx") is is_y

@@ -137,7 +137,7 @@ def _computed(found, output, known, depth):
         return value if abs(value) < _LARGEST else None
     if node.type == "BLACKBODY":
         temperature = found["Temperature"]._constant(known, depth)
-        if temperature is None or not temperature >= blackbody.LEAST:
+        if temperature is None:
             return None
         return (*map(float, blackbody.blackbody_color(temperature)), 1.0)
     if node.type == "LIGHT_FALLOFF" and output.name == "Quadratic" and found["Smooth"]._constant(known, depth) == 0.0:

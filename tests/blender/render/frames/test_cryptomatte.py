@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cryptomatte passes have a matte per object, hair system, material and asset, which other programs read."""
 
+import json
+
 import bpy
 import numpy as np
 import OpenEXR
 import pytest
+from mathutils import Vector
 
 from hair_addon.blender.render import film
 from tests.support.cryptomatte_reader import mattes
@@ -52,6 +55,55 @@ def motion(scene):
         sphere.location.x = place
         sphere.keyframe_insert("location", frame=frame)
     scene.render.use_motion_blur, scene.vellus.motion_steps = True, 3
+
+
+def behind_glass(scene):
+    """Place a pane of glass that covers half of the picture in front of everything."""
+    pane = bpy.data.meshes.new("Pane")
+    corners = [
+        scene.camera.matrix_world @ Vector(place) for place in ((-9, -9, -1), (0, -9, -1), (0, 9, -1), (-9, 9, -1))
+    ]
+    pane.from_pydata(corners, [], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("Glass")
+    next(one for one in material.node_tree.nodes if one.type == "BSDF_PRINCIPLED").inputs[
+        "Transmission Weight"
+    ].default_value = 1.0
+    pane.materials.append(material)
+    scene.collection.objects.link(bpy.data.objects.new("Pane", pane))
+
+
+def test_glass_has_no_matte(three, tmp_path):
+    """Behind glass, which adds reflections to the picture, objects have the same coverages."""
+    passes, found = read(tmp_path)
+    behind_glass(bpy.context.scene)
+    reflecting, others = read(tmp_path)
+    assert np.abs(reflecting["Combined"] - passes["Combined"]).max() > 0.01
+    assert set(found) == set(others) and all(np.array_equal(found[name], others[name]) for name in found)
+
+
+def test_openimageio_reads_the_same_mattes(three, tmp_path):
+    """OpenImageIO, which other programs read files with, finds the same numbers, coverages and manifests."""
+    _passes, found = read(tmp_path)
+    bpy.utils.expose_bundled_modules()
+    oiio = pytest.importorskip("OpenImageIO")
+    image = oiio.ImageBuf(str(tmp_path / "rendered.exr"))
+    texts = {one.name: one.value for one in image.spec().extra_attribs if one.name.startswith("cryptomatte/")}
+    (key,) = (name[:-5] for name, text in texts.items() if name.endswith("/name") and text == "ViewLayer.CryptoObject")
+    manifest, channels = json.loads(texts[f"{key}/manifest"]), {}
+    for part in range(image.nsubimages):
+        part_of_file = oiio.ImageBuf(str(tmp_path / "rendered.exr"), part, 0)
+        layer, pixels = part_of_file.spec()["oiio:subimagename"], np.asarray(part_of_file.get_pixels(oiio.FLOAT))
+        for index, name in enumerate(part_of_file.spec().channelnames):
+            channels[name if "." in name else f"{layer}.{name}"] = pixels[::-1, :, index]
+    ranks = sorted({name.rpartition(".")[0] for name in channels if name.startswith("ViewLayer.CryptoObject")})
+    pairs = [[channels[f"{rank}.{one}"] for one in pair] for rank in ranks for pair in ("RG", "BA")]
+    assert set(manifest) == set(found) and pairs
+    for name, digits in manifest.items():
+        number = np.uint32(int(digits, 16)).view(np.float32)
+        covered = sum(np.where(numbers == number, coverage, 0.0) for numbers, coverage in pairs)
+        np.testing.assert_allclose(covered, found[name], atol=1e-6)
+    total = sum(coverage for _numbers, coverage in pairs)
+    assert total.max() < 1.001
 
 
 @pytest.mark.parametrize("how", ["filter", "motion blur", "depth of field", "tiles"])
