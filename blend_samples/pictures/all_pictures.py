@@ -44,6 +44,7 @@ SCRIPTS = {
 SLOW = {
     "cycles": "blend_samples/demo.py --out OUT --only-cycles --cycles-samples 128",
     "cards": "blend_samples/pictures/cards.py",
+    "haircuts": "blend_samples/pictures/haircut_pictures.py",
     "maps": "blend_samples/pictures/map_pictures.py",
     "dynamics": "blend_samples/dynamics/dynamics.py shaking wind ball --out OUT --docs docs",
     "five_minutes": "tools/manual_pictures.py five_minutes",
@@ -80,6 +81,7 @@ OTHERS = {
     "data_flow": ("data_flow.svg",),
     "dynamics_settings": ("manual/dynamics_*.png",),
     "cards": ("manual/cards.jpg",),
+    "haircuts": ("manual/haircuts.jpg",),
     "maps": ("manual/maps.jpg", "manual/more_maps.jpg"),
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),

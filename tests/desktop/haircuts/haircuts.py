@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Haircuts as lists of steps: what an artist presses, types and draws. `HAIRCUTS` has them by name.
+
+The face of the sample's head looks to -Y, +X is its left, and the head is 0.25 m high. Hair grows in its vertex group
+`scalp`.
+"""
+
+import numpy as np
+
+from tests.desktop.haircuts.hands import (
+    comb,
+    cursor,
+    curve,
+    fields,
+    lines,
+    mirrored,
+    press,
+    select,
+    view,
+    weights,
+)
+
+BACK, ABOVE = (0, 1, 0.15), (0, -0.25, 1)
+SIDE, FRONT = (1, 0, 0), (0, -1, 0.55)
+
+PARTING = ((0.030, -0.140, 0.80), (0.030, -0.10, 0.84), (0.028, -0.06, 0.853), (0.02, -0.02, 0.85))
+MIDDLE = ((0.0, -0.150, 0.79), (0.0, -0.10, 0.84), (0.0, -0.05, 0.853), (0.0, 0.0, 0.85), (0.0, 0.04, 0.82))
+
+
+def grown(length, mask="scalp", **values):
+    """A hair system on the head, where a vertex group is painted."""
+    return (
+        select("Head"),
+        press("vellus.add_hair", density_group=mask),
+        fields("guides", length=length, **values),
+    )
+
+
+def both_sides(*strokes, middle=0.0):
+    """Strokes, and their mirror images about a parting."""
+    return (*strokes, *(tuple((2.0 * middle - x, y, z) for x, y, z in stroke) for stroke in strokes))
+
+
+# From a parting on the left, over the hairline of both temples and round the crown.
+AWAY_FROM_PARTING = (
+    ((0.022, -0.140, 0.80), (-0.03, -0.128, 0.815), (-0.068, -0.10, 0.785), (-0.085, -0.06, 0.75)),
+    ((0.036, -0.138, 0.80), (0.060, -0.118, 0.80), (0.080, -0.08, 0.76), (0.085, -0.05, 0.745)),
+    ((0.020, -0.08, 0.848), (-0.04, -0.07, 0.84), (-0.080, -0.04, 0.79)),
+    ((0.036, -0.08, 0.846), (0.060, -0.06, 0.83), (0.082, -0.03, 0.78)),
+    ((0.012, -0.01, 0.85), (-0.05, 0.01, 0.82), (-0.07, 0.03, 0.77)),
+    ((0.024, -0.01, 0.85), (0.055, 0.01, 0.82), (0.07, 0.03, 0.77)),
+)
+
+# In a layer, which keeps the combing when the guides or the mesh change.
+OFF_THE_FACE = (
+    press("vellus.add_layer"),
+    view(0, -1, 0.1),
+    comb(
+        "Comb",
+        0.035,
+        *both_sides(
+            ((0.0, -0.15, 0.76), (0.05, -0.15, 0.755), (0.115, -0.12, 0.745)),
+            ((0.0, -0.15, 0.71), (0.05, -0.15, 0.71), (0.115, -0.12, 0.70)),
+            ((0.0, -0.15, 0.66), (0.05, -0.15, 0.66), (0.105, -0.12, 0.655)),
+        ),
+    ),
+    press("vellus.comb_guides"),
+)
+
+WAVY = (
+    *grown(0.28, drape=False),
+    view(*ABOVE),
+    lines("vellus.draw_parting", PARTING),
+    view(*FRONT),
+    lines("vellus.draw_flow", *AWAY_FROM_PARTING),
+    fields("guides", drape=True),
+    *OFF_THE_FACE,
+    press("vellus.apply_style_preset", preset="WAVY"),
+    press("vellus.apply_preset", preset="BROWN"),
+)
+
+BOB = (
+    *grown(0.24, drape=False),
+    view(*ABOVE),
+    lines("vellus.draw_parting", MIDDLE),
+    view(*FRONT),
+    lines(
+        "vellus.draw_flow",
+        *both_sides(
+            ((0.006, -0.142, 0.80), (0.045, -0.130, 0.80), (0.075, -0.10, 0.77), (0.088, -0.075, 0.73)),
+            ((0.006, -0.07, 0.85), (0.055, -0.06, 0.83), (0.082, -0.045, 0.78)),
+            ((0.006, 0.0, 0.85), (0.05, 0.01, 0.82), (0.068, 0.03, 0.77)),
+        ),
+    ),
+    fields("guides", drape=True),
+    *OFF_THE_FACE,
+    press("mesh.primitive_plane_add", size=0.6, location=(0.0, 0.0, 0.655)),
+    select("Head"),
+    press("vellus.trim_guides", cutter="Plane"),
+    select("Plane"),
+    press("object.delete", confirm=False),
+    select("Hair"),
+    press("vellus.apply_style_preset", preset="SLEEK"),
+    press("vellus.apply_preset", preset="DARK_BROWN"),
+)
+
+TAIL = ((0.0, 0.040, 0.795), (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.090, 0.74), (0.0, 0.085, 0.60))
+
+PONYTAIL = (
+    *grown(0.36, drape=False),
+    view(*SIDE),
+    curve("Tie", TAIL, depth="CURSOR"),
+    select("Head"),
+    press("vellus.gather_guides", line="Tie", shape="PONYTAIL"),
+    press("vellus.apply_preset", preset="LIGHT_BROWN"),
+)
+
+BUN = (
+    *grown(0.36, drape=False, length_variation=0.0, guide_count=700),
+    view(*SIDE),
+    curve("Tie", ((0.0, 0.035, 0.805), (0.0, 0.065, 0.83)), depth="CURSOR"),
+    select("Head"),
+    press("vellus.gather_guides", line="Tie", shape="BUN"),
+    press("vellus.apply_preset", preset="GINGER"),
+)
+
+BRAIDS = (
+    *grown(0.40, drape=False, length_variation=0.0, guide_count=700),
+    view(*ABOVE),
+    lines("vellus.draw_parting", MIDDLE, ((0.0, 0.03, 0.83), (0.0, 0.055, 0.80))),
+    view(*BACK),
+    lines("vellus.draw_parting", ((0.0, 0.04, 0.82), (0.0, 0.065, 0.76), (0.0, 0.05, 0.69), (0.0, 0.04, 0.66))),
+    view(0, 1, 0),
+    cursor(0.080, 0.0, 0.70),
+    view(*SIDE),
+    curve(
+        "Ties",
+        ((0.08, 0.010, 0.700), (0.08, 0.012, 0.670), (0.08, -0.03, 0.63), (0.08, -0.105, 0.585), (0.08, -0.125, 0.46)),
+        depth="CURSOR",
+        is_mirrored=True,
+    ),
+    select("Head"),
+    press("vellus.gather_guides", line="Ties", shape="BRAID"),
+    press("vellus.apply_preset", preset="AUBURN"),
+)
+
+ROWS = tuple(
+    tuple(
+        (0.078 * np.sin(tilt), 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(tilt) * np.cos(angle))
+        for angle in np.linspace(-1.35, 1.5, 24)  # from the hairline over the top to the nape
+    )
+    for tilt in np.linspace(-1.15, 1.15, 8)  # from one temple to the other
+)
+
+CORNROWS = (
+    *grown(0.26, drape=False, length_variation=0.0, guide_count=1000),
+    view(0.0, 0.4, 1.0),
+    curve("Rows", *ROWS),
+    select("Head"),
+    press("vellus.gather_guides", line="Rows", shape="CORNROWS"),
+    press("vellus.apply_preset", preset="BLACK"),
+)
+
+BEARD = (
+    select("Head"),
+    press("object.vertex_group_add"),
+    press("paint.weight_paint_toggle"),
+    mirrored(),
+    view(1.0, -0.35, -0.1, middle=(0.0, -0.06, 0.68), distance=0.45),
+    weights(
+        1.0,
+        0.013,
+        ((0.07, -0.062, 0.715), (0.068, -0.070, 0.69), (0.062, -0.085, 0.665), (0.045, -0.115, 0.645)),
+        ((0.066, -0.062, 0.68), (0.060, -0.075, 0.655), (0.045, -0.11, 0.632), (0.02, -0.135, 0.625)),
+        ((0.066, -0.075, 0.695), (0.058, -0.095, 0.67), (0.045, -0.12, 0.655)),
+        ((0.06, -0.075, 0.64), (0.045, -0.10, 0.622), (0.02, -0.12, 0.615)),
+    ),
+    view(0.0, -1.0, -0.1, middle=(0.0, -0.06, 0.68), distance=0.45),
+    weights(
+        1.0,
+        0.010,
+        ((0.0, -0.15, 0.622), (0.025, -0.14, 0.628), (0.045, -0.115, 0.642)),
+        ((0.0, -0.15, 0.636), (0.025, -0.14, 0.638), (0.045, -0.115, 0.655)),
+        ((0.033, -0.135, 0.65), (0.036, -0.13, 0.662)),
+    ),
+    weights(1.0, 0.005, ((0.0, -0.155, 0.677), (0.018, -0.15, 0.676), (0.033, -0.14, 0.668))),
+    press("paint.weight_paint_toggle"),
+    *grown(0.022, mask="Group", gravity=0.6),
+    fields("hair", radius=3.0e-5),
+    press("vellus.apply_style_preset", preset="BEARD"),
+    press("vellus.apply_preset", preset="DARK_BROWN"),
+)
+
+HAIRCUTS = {
+    "wavy": WAVY,
+    "bob": BOB,
+    "bun": BUN,
+    "ponytail": PONYTAIL,
+    "braids": BRAIDS,
+    "cornrows": CORNROWS,
+    "beard": BEARD,
+}

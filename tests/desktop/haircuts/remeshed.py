@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Combing in a layer stays when the head is remeshed and the guides are doubled, in a window.
+
+Run by a desktop Blender as steps.py says. Notes how far guides are from the nearest guides that were combed.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils.kdtree import KDTree
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.haircuts import hands  # noqa: E402
+from tests.desktop.haircuts.haircuts import AWAY_FROM_PARTING, FRONT, SIDE, grown  # noqa: E402
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    curve_points,
+    import_head,
+    install,
+    mask_scalp,
+    refine_to,
+    take_picture,
+    wait,
+    wait_for,
+)
+
+VOXEL = 0.005  # [m]
+COUNT, STRANDS = 400, 300
+_COMBED = 0.05  # distance by which combing moved a guide, over its length, from which the guide is combed
+
+STYLED = (
+    *grown(0.28, drape=False),
+    hands.fields("hair", strand_count=STRANDS),
+    hands.view(*FRONT),
+    hands.lines("vellus.draw_flow", *AWAY_FROM_PARTING),
+    hands.fields("guides", drape=True),
+)
+
+# The hair of the left side to the back.
+COMBED = (
+    hands.press("vellus.add_layer"),
+    hands.view(*SIDE),
+    hands.comb("Comb", 0.05, *[[(0.09, y, z) for y in (-0.12, -0.02, 0.08)] for z in (0.76, 0.70, 0.64, 0.58)]),
+    hands.press("vellus.comb_guides"),
+)
+
+
+def guides():
+    """Return (G, P, 3) positions."""
+    return curve_points(hands.guides()).reshape(len(hands.guides().data.curves), -1, 3)
+
+
+def distances(found, others):
+    """Return (G,) mean distances of guides from those of the others with the nearest roots, over their lengths."""
+    tree = KDTree(len(others))
+    for number, guide in enumerate(others):
+        tree.insert(guide[0], number)
+    tree.balance()
+    nearest = others[[tree.find(guide[0])[1] for guide in found]]
+    apart = np.linalg.norm((found - found[:, :1]) - (nearest - nearest[:, :1]), axis=2).mean(axis=1)
+    return apart / np.linalg.norm(np.diff(found, axis=1), axis=2).sum(axis=1)
+
+
+def comb():
+    install(ZIP)
+    refine_to(1)
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    mask_scalp(import_head())
+    yield from wait(0.5)
+    for step in STYLED:
+        yield from step()
+    grown_guides = guides()
+    for step in COMBED:
+        yield from step()
+    combed = guides()
+    facts["combed"] = np.sort(distances(combed, grown_guides)).tolist()
+    take_picture(OUT / "combed.png")
+    bpy.context.view_layer.objects.active = bpy.data.objects["Head"]
+    bpy.data.objects["Head"].data.remesh_voxel_size = VOXEL
+    bpy.data.objects["Head"].data.use_remesh_preserve_attributes = True
+    before = len(bpy.data.objects["Head"].data.vertices)
+    yield from hands.select("Head")()
+    # Voxel Remesh makes two walls of a mesh with holes.
+    yield from hands.press("object.mode_set", mode="EDIT")()
+    yield from hands.press("mesh.select_all", action="SELECT")()
+    yield from hands.press("mesh.fill_holes", sides=0)()
+    yield from hands.press("object.mode_set", mode="OBJECT")()
+    yield from hands.press("object.voxel_remesh")()
+    yield from wait(1.0)
+    facts["vertices"] = [before, len(bpy.data.objects["Head"].data.vertices)]
+    facts["groups"] = [group.name for group in bpy.data.objects["Head"].vertex_groups]
+    yield from hands.select("Hair Guides")()
+    yield from hands.fields("guides", guide_count=2 * COUNT)()
+    yield from wait_for(lambda: len(hands.guides().data.curves) == 2 * COUNT, 30.0)
+    yield from wait(1.0)
+    after = guides()
+    facts["guides"], facts["status"] = len(after), [hands.hair().data.vellus.status, hands.guides().data.vellus.status]
+    is_combed = distances(combed, grown_guides) > _COMBED
+    roots = combed[is_combed][:, 0]
+    near = np.array([np.linalg.norm(roots - guide[0], axis=1).min() < 0.006 for guide in after])
+    facts["from combed"] = np.sort(distances(after[near], combed)).tolist()
+    facts["from uncombed"] = np.sort(distances(after[near], grown_guides)).tolist()
+    # The distance between neighbors, without any change.
+    some = np.arange(len(combed)) % 2 == 0
+    facts["between neighbors"] = np.sort(distances(combed[some & is_combed], combed[~some])).tolist()
+    take_picture(OUT / "remeshed.png")
+
+
+if __name__ == "__main__":
+    take((comb,), pause=0.02)
