@@ -50,7 +50,8 @@ class Table:
     """The distinct courses of a program, in rows."""
 
     def __init__(self) -> None:
-        self._rows: dict[bytes, int] = {}
+        self._places: dict[bytes, int] = {}
+        self._rows: list[np.ndarray] = []
 
     def packed(self, courses: Courses, place: int, names: tuple[str, ...]) -> int:
         """Return the rows of the courses of a step, from one, in `BITS` bits each; 0 in place of absent courses.
@@ -61,7 +62,10 @@ class Table:
         for slot, name in enumerate(names):
             course = courses.get((place, name))
             if course is not None:
-                row = self._rows.setdefault(sampled(course).tobytes(), len(self._rows))
+                samples = sampled(course)
+                row = self._places.setdefault(samples.tobytes(), len(self._rows))
+                if row == len(self._rows):
+                    self._rows.append(samples)
                 found |= (row + 1) << (BITS * slot)
         if len(self._rows) >= 1 << BITS:
             raise HairError("The styles of a hair may have at most {most} curves.", most=(1 << BITS) - 1)
@@ -69,7 +73,7 @@ class Table:
 
     def rows(self) -> np.ndarray:
         """Return (C, `SAMPLES`) float32."""
-        return np.frombuffer(b"".join(self._rows), np.float32).reshape(-1, SAMPLES)
+        return np.array(self._rows, np.float32).reshape(-1, SAMPLES)
 
 
 def names_of(module: Any) -> tuple[str, ...]:
