@@ -110,8 +110,7 @@ def clear_map(hair: Curves, setting: str) -> bool:
     >>> api.clear_map(bpy.data.objects["Hair"], "look.color")
     True
     """
-    if varied_settings.style_of(setting)[1] not in varied_settings.with_course():
-        varied_settings.require_varied(setting)
+    varied_settings.require_varied_or_course(setting)
     return blender.settings.map_items.remove(_editable(hair, setting).vellus, setting)
 
 

@@ -85,8 +85,14 @@ def _parsed_course(text):
 
 
 def mapped(given, settings):
-    """Return `GroomSettings` with the maps and the curves of options; images are loaded. Raises `HairError`."""
-    maps = {one.setting: one for one in (*settings.maps, *map(_loaded, given.maps))}
+    """Return `GroomSettings` with the maps and the curves of options; images are loaded. Raises `HairError`.
+
+    A map of an option keeps the curve from root to tip of the map that it replaces.
+    """
+    maps = {one.setting: one for one in settings.maps}
+    for one in map(_loaded, given.maps):
+        before = maps.get(one.setting, one)
+        maps[one.setting] = replace(one, course=one.course or before.course)
     for setting, course in given.courses:
         maps[setting] = replace(maps.get(setting, MapSettings(setting=setting)), course=course)
     curve = settings.thickness_curve if given.thickness_curve is None else given.thickness_curve

@@ -386,13 +386,14 @@ def schema() -> dict[str, Any]:
 
 def _map_schema():
     keys = {_MAP_KEYS.get(setting[0], setting[0]): _property(*setting) for setting in declared(MapSettings)}
-    names = "|".join(varied_settings.of_styles())
+    of_styles = sorted({*varied_settings.of_styles(), *varied_settings.with_course()})
+    names = "|".join(of_styles)
     known = {"enum": list(varied_settings.all_varied())}, {"pattern": rf"^styles\..+\.({names})$"}
     keys["setting"] |= {"anyOf": list(known)}
     item = {"type": "object", "required": ["setting"], "additionalProperties": False, "properties": keys}
     return {"title": "Maps, at most one for each setting", "type": "array"} | {
         "minItems": 0,
-        "maxItems": len(varied_settings.all_varied()) + MOST_STYLES * len(varied_settings.of_styles()),
+        "maxItems": len(varied_settings.all_varied()) + MOST_STYLES * len(of_styles),
         "items": item,
     }
 

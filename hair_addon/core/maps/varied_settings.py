@@ -92,14 +92,21 @@ def require_varied(setting: str) -> None:
         raise HairError('No map can vary "{setting}": use one of {known}.', setting=setting, known=known)
 
 
+def require_varied_or_course(setting: str) -> None:
+    """Raise `HairError` unless a map may vary a setting, or a curve from root to tip may multiply it."""
+    if style_of(setting)[1] not in with_course():
+        require_varied(setting)
+
+
 def require_map(settings: map_settings.MapSettings) -> None:
     """Raise `HairError` unless a map may vary its setting and has a ramp of the setting's kind.
 
-    A map without a source may have only a curve from root to tip.
+    A map without a source may also be of a setting that only a curve from root to tip can multiply.
     """
+    require_varied_or_course(settings.setting)
     if settings.course:
         require_course(settings.setting)
-    if settings.has_source or not settings.course:
+    if settings.has_source:
         require_varied(settings.setting)
     ramp = ramp_text.parsed(settings.ramp)
     if isinstance(ramp, ramp_text.Curve) and is_color(settings.setting):

@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import re
 from dataclasses import replace
 
 import pytest
@@ -127,6 +128,9 @@ def test_the_schema_knows_every_setting():
     }
     # Settings of tables that come from the appearance are stored with the appearance, under its names.
     assert everything - {*named} == {"eta", "sigma_a", "beta_r"}
+    pattern = sections["maps"]["items"]["properties"]["setting"]["anyOf"][1]["pattern"]
+    varied = [name for found in KINDS.values() for name, _, p in declared(found) if p.may_vary or p.has_course]
+    assert all(re.match(pattern, f"styles.Curl.001.{name}") for name in varied)
 
 
 def test_what_a_file_leaves_out_is_at_its_default(tmp_path):

@@ -174,8 +174,7 @@ def _editable_map(context, setting):
 
 def _owner_of(context, setting):
     """Return the active hair or guides, whichever have a setting that may vary. Raises `HairError`."""
-    if varied_settings.style_of(setting)[1] not in varied_settings.with_course():
-        varied_settings.require_varied(setting)
+    varied_settings.require_varied_or_course(setting)
     owner = guides_of(context.object) if varied_settings.is_of_guides(setting) else hair_of(context.object)
     if owner is None:
         raise HairError("Select hair or guides.")

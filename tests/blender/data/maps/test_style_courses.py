@@ -121,6 +121,22 @@ def test_a_map_and_a_curve_multiply(curls):
     np.testing.assert_array_equal(points(curls), both)
 
 
+def test_an_opened_popover_and_a_removed_curve_of_an_amount_change_nothing(curls):
+    """The amount, which maps cannot vary, may have an item without a curve: copies and settings keep it."""
+    plain, name = points(curls), "styles.Curl.amount"
+    bpy.ops.vellus.edit_map("EXEC_DEFAULT", setting=name)
+    assert api.settings_of(curls).maps == (MapSettings(setting=name),)
+    bpy.ops.vellus.add_course(setting=name)
+    bpy.ops.vellus.remove_course(setting=name)
+    assert bpy.ops.vellus.duplicate_style() == {"FINISHED"}
+    bpy.ops.vellus.remove_style()
+    api.apply_settings(curls, api.settings_of(curls))
+    np.testing.assert_array_equal(points(curls), plain)
+    assert curls.vellus.status == ""
+    with pytest.raises(HairError, match="No map can vary"):
+        api.set_map(curls, name, "strand")
+
+
 def test_settings_without_a_curve_say_so(curls):
     """Wrong settings are errors, and a curve that a style cannot have is a status."""
     for setting in (
@@ -152,6 +168,8 @@ def test_the_command_lines_curves():
     given = parser.parse_args(["--course", f"{RADIUS}={FALLING}", "--map", f"{RADIUS}=strand,low=0.5"])
     found = map_options.mapped(given, settings_file.GroomSettings()).maps
     assert found == (MapSettings(setting=RADIUS, kind="STRAND", low=0.5, course=FALLING),)
+    of_file = settings_file.GroomSettings(maps=(MapSettings(setting=RADIUS, kind="CLUMP", course=FALLING),))
+    assert map_options.mapped(parser.parse_args(["--map", f"{RADIUS}=strand,low=0.5"]), of_file).maps == found
     for wrong in ("styles.Curl.radius", "styles.Curl.radius=1", "look.color=0:1 1:1", "styles.Curl.radius="):
         with pytest.raises(argparse.ArgumentError):
             parser.parse_args(["--course", wrong])
