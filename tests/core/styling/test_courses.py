@@ -10,6 +10,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import hair_styles
 from hair_addon.core.styling import bend, braid, clump, courses, curl, frizz, kinds, lean, smooth
 from hair_addon.core.styling.masks import Inputs
+from tests.support.devices import DEVICE
 from tests.support.strands.styled import head
 
 CURL = curl.Settings()
@@ -43,8 +44,10 @@ def styled(hair, name, curves):
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_course_of_one_keeps_all_bits(hair, name):
+    """A course of ones gives the bits of no course; on a GPU, whose compiler fuses operations, to rounding."""
     ones = dict.fromkeys(courses.settings_with_course(CASES[name][0]), np.ones(5))
-    np.testing.assert_array_equal(styled(hair, name, ones), styled(hair, name, {}))
+    found, plain = styled(hair, name, ones), styled(hair, name, {})
+    np.testing.assert_allclose(found, plain, rtol=0.0, atol=0.0 if DEVICE == "cpu" else 2e-7)
 
 
 @pytest.mark.parametrize(("name", "setting"), SETTINGS)
