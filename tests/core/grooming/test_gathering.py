@@ -84,6 +84,20 @@ def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
         assert after[is_near, -1, 2].max() < TIE[2]  # where the line leads
 
 
+def test_hair_of_any_length_stays_in_a_bun_and_becomes_equally_long(ball):
+    guides = guides_on(80)
+    whole = LENGTH * np.linspace(0.9, 1.5, 80)
+    guides = guides[:, :1] + (guides - guides[:, :1]) * (whole / LENGTH)[:, None, None]
+    settings = replace(SETTINGS, shape="BUN", bun_radius=0.03)
+    after, _groups, _held = gathered(ball, guides.astype(np.float32), [TAIL], settings)
+    middle = TIE * (1.0 + (settings.clearance + settings.bun_radius) / RADIUS)
+    tie = TIE * (1.0 + settings.clearance / RADIUS)
+    at_tie = np.linalg.norm(after - tie, axis=2).argmin(axis=1)
+    is_behind = np.arange(after.shape[1]) > at_tie[:, None]
+    assert np.linalg.norm(after - middle, axis=2)[is_behind].max() < 1.15 * settings.bun_radius
+    np.testing.assert_allclose(segments(after).sum(axis=1), np.median(whole), rtol=1e-4)
+
+
 def test_symmetric_guides_stay_symmetric(ball):
     """Symmetric guides stay symmetric, up to the asymmetry of the mesh's triangles."""
     after, _groups, _held = gathered(ball, guides_on(80), [TAIL], SETTINGS)

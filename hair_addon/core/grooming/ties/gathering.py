@@ -4,7 +4,8 @@
 The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height
 grows toward the tie, because it lies on the hair of all roots that it passes: by the area of this hair divided by the
 circumference. Each guide keeps its angle around the tie, and its distance determines its place in the disk of the tie,
-by equal areas. Segments keep their lengths; guides that are too short end before the tie.
+by equal areas. Segments keep their lengths; guides that are too short end before the tie. In a bun, guides that reach
+the tie become equally long: neighbors are wound by equal angles, and the strands between them stay in the ball.
 """
 
 from collections.abc import Sequence
@@ -98,11 +99,24 @@ def _at_line(mesh, query, points, line, field, settings):
         behind, locks, left = cornrows.ways_along(ways, ranks, braid, reach, settings)
         ends = _lengths(np.concatenate([ways, behind[:, :1]], axis=1)) + left
     else:
-        ends = np.full(len(ways), np.inf) if settings.shape == "BUN" else _lengths(ways)
+        ends = _lengths(ways)
+        if settings.shape == "BUN":
+            lengths, ends = _evened(lengths, ends), np.full(len(ways), np.inf)
         behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
+    turn = ways.shape[1] if settings.shape == "BUN" else None
     ways = np.concatenate([ways, behind], axis=1)
     ways[:, 0] = points[:, 0]
-    return joined(points, split(_walked(ways, lengths))[0], lengths), locks, ends
+    return joined(points, split(_walked(ways, lengths, turn))[0], lengths), locks, ends
+
+
+def _evened(lengths, ends):
+    """Return lengths (S, P-1) [m] of segments: guides that are longer than `ends` (S,) [m] get their median length."""
+    whole = lengths.sum(axis=1)
+    is_long = whole > ends
+    if not is_long.any():
+        return lengths
+    common = np.maximum(np.median(whole[is_long]), ends)
+    return np.where(is_long[:, None], lengths * (common / np.maximum(whole, 1e-30))[:, None], lengths)
 
 
 def _lengths(ways):
@@ -184,23 +198,37 @@ def _angles(ways, tail, normal):
     return np.arctan2(turned @ tail.ups[0], turned @ tail.sides[0])
 
 
-def _walked(ways, lengths):
-    """Return (S, P, 3) float32: points on ways (S, K, 3), as far apart as segments (S, P-1) are long."""
+def _walked(ways, lengths, turn):
+    """Return (S, P, 3) float32: points on ways (S, K, 3), as far apart as segments (S, P-1) are long.
+
+    At the end of their ways, guides go straight on, or back to the point `turn` and forth again.
+    """
     middle = ways.mean(axis=(0, 1))
     shared = [np.ascontiguousarray(ways - middle, np.float32), np.ascontiguousarray(lengths, np.float32)]
+    last = ways.shape[1] - 1
     out = parallel.empty_vectors((len(ways), lengths.shape[1] + 1), "cpu")
     inputs = [
         Rows(wp.array(shared[0], dtype=wp.vec3, device="cpu", copy=False)),
         Rows(wp.array(shared[1], dtype=float, device="cpu", copy=False)),
+        last if turn is None else min(turn, last),
     ]
     parallel.launch(_walk, len(ways), inputs, [out], "cpu", least_rows=256)
     return (out.numpy() + middle).astype(np.float32)
+
+
+@wp.func
+def _back_and_forth(place: int, turn: int, last: int) -> int:
+    """Return the point of a way at a place of the walk to its last point, back to `turn`, and forth again."""
+    if place <= last:
+        return place
+    return last - wp.abs((place - turn) % (2 * (last - turn)) - (last - turn))
 
 
 @wp.kernel
 def _walk(
     ways: wp.array2d[wp.vec3],
     lengths: wp.array2d[float],
+    turn: int,
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
@@ -212,21 +240,27 @@ def _walk(
     onward = wp.vec3(0.0, 0.0, 0.0)
     for i in range(lengths.shape[1]):
         length = lengths[guide, i]
-        while segment < last and wp.length(ways[guide, segment + 1] - place) < length:
+        end = last
+        if turn < last:
+            end = segment + 2 * last
+        ahead = ways[guide, _back_and_forth(wp.min(segment + 1, end), turn, last)]
+        while segment < end and wp.length(ahead - place) < length:
             segment += 1
-        if segment < last:
+            ahead = ways[guide, _back_and_forth(wp.min(segment + 1, end), turn, last)]
+        if segment < end:
             # The place between two points of the way that is one length away.
-            start = ways[guide, segment] - place
-            step = ways[guide, segment + 1] - ways[guide, segment]
+            behind = ways[guide, _back_and_forth(segment, turn, last)]
+            start = behind - place
+            step = ahead - behind
             a = wp.dot(step, step)
             b = wp.dot(start, step)
             c = wp.dot(start, start) - length * length
             t = float(1.0)
             if a > 0.0:
                 t = wp.clamp((wp.sqrt(wp.max(b * b - a * c, 0.0)) - b) / a, 0.0, 1.0)
-            target = ways[guide, segment] + t * step
+            target = behind + t * step
         else:
-            target = ways[guide, last]
+            target = ahead
             if wp.length(onward) > 0.0:
                 target = place + length * onward
         if wp.length(target - place) > 0.0:
