@@ -20,7 +20,8 @@ def add(verbs):
     panorama.set_defaults(run=run, json=True, quiet=False, verbose=False)
     bake = verbs.add_parser("bake_surfaces")
     bake.add_argument("input", help="a .blend with the meshes")
-    bake.add_argument("--names", required=True, help="names of the objects, a JSON list")
+    bake.add_argument("--sources", required=True, help="(file of the library, name) of the objects, a JSON list")
+    bake.add_argument("--frame", type=float, default=1.0)
     bake.add_argument("--out", required=True, help="the folder of 0.npz, 1.npz, …")
     bake.add_argument("--for-render", action="store_true", help="with the modifiers of renders")
     bake.set_defaults(run=bake_surfaces, json=True, quiet=False, verbose=False)
@@ -33,7 +34,7 @@ def run(given, console):
 
 
 def bake_surfaces(given, console):
-    """Bake the materials of the named objects of a file."""
-    names = json.loads(given.names)
-    blender.io.pictures.surface_bake.bake(given.input, names, given.for_render, given.out)
-    console.result({"baked": len(names)}, "")
+    """Bake the materials of objects of a file and its libraries."""
+    sources = json.loads(given.sources)
+    blender.io.pictures.surface_bake.bake(given.input, sources, given.frame, given.for_render, given.out)
+    console.result({"baked": len(sources)}, "")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of any nodes are baked once by Cycles, and surfaces and the light they reflect have their colors."""
 
+import os
 import sys
 import time
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from hair_addon import command_line
-from hair_addon.blender.data.pictures import drawn_meshes, surface_bakes, unread_nodes
+from hair_addon.blender.data.pictures import drawn_meshes, kept_files, surface_bakes, unread_nodes
 from hair_addon.blender.host import cli_command
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
@@ -127,6 +128,96 @@ def test_baked_surfaces_are_as_in_cycles(stage, tmp_path):
     assert not surface_bakes.sentences()
 
 
+def plain_color(name, color):
+    """Return a material with one color by a node that is baked, and the node's socket Value, a factor."""
+    material, tree, shader = new_tree(name)
+    changed = node(tree, "ShaderNodeHueSaturation", shader.inputs["Base Color"], coordinates=False)
+    changed.inputs["Color"].default_value = (*color, 1.0)
+    return material, changed.inputs["Value"]
+
+
+def linked_wall(name, color, path):
+    """Return a wall that is linked from a file."""
+    placed = wall(plain_color(name, color)[0])
+    placed.name = name
+    bpy.data.libraries.write(str(path), {placed})
+    bpy.data.objects.remove(placed)
+    with bpy.data.libraries.load(str(path), link=True) as (_names, wanted):
+        wanted.objects = [name]
+    bpy.context.collection.objects.link(wanted.objects[0])
+    return wanted.objects[0]
+
+
+@pytest.mark.farm
+def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
+    """One process bakes objects with several materials and drivers, linked objects, and objects with custom properties;
+    copies are baked once. An object that cannot be baked leaves the others as they are, and removed pictures are baked
+    again.
+    """
+    baked, start = [], surface_bakes._Baking.__init__
+    monkeypatch.setattr(
+        surface_bakes._Baking,
+        "__init__",
+        lambda self, objects, *how: (baked.append(len(objects)), start(self, objects, *how))[1],
+    )
+    (red, value), (blue, _value), (gray, factor) = (
+        plain_color(name, color)
+        for name, color in (("Red", (0.8, 0.1, 0.1)), ("Blue", (0.1, 0.2, 0.8)), ("Gray", (0.5,) * 3))
+    )
+    value.driver_add("default_value").driver.expression = "frame / 20"
+    stage.frame_set(10)
+    full, both = wall(red), wall(red)
+    for _layer in range(8):
+        full.data.uv_layers.new()
+    both.data.materials.append(blue)
+    for polygon in both.data.polygons:
+        polygon.material_index = polygon.index % 2
+    stage.collection.objects.link(both.copy())
+    head = linked_wall("Head", (0.3, 0.6, 0.1), tmp_path / "head.blend")
+    dirty = wall(gray)
+    dirty["dirt"] = 0.4
+    attribute = gray.node_tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_type, attribute.attribute_name = "OBJECT", "dirt"
+    gray.node_tree.links.new(attribute.outputs["Fac"], factor)
+
+    def colors():
+        bpy.context.view_layer.update()
+        meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
+        return {mesh.owner[0]: [color for _count, color in mesh.colors] for mesh in meshes}
+
+    found = colors()
+    np.testing.assert_allclose(found[both.session_uid], [(0.4, 0.05, 0.05), (0.1, 0.2, 0.8)], atol=1e-3)
+    np.testing.assert_allclose(found[head.session_uid], [(0.3, 0.6, 0.1)], atol=1e-3)
+    np.testing.assert_allclose(found[dirty.session_uid], [(0.2, 0.2, 0.2)], atol=1e-3)
+    assert baked == [4]
+    (sentence,) = surface_bakes.sentences()
+    assert full.name in sentence and "UV maps" in sentence
+    dirty["dirt"] = 1.0
+    dirty.update_tag()
+    for file in kept_files.folder("surfaces").glob("*.npz"):
+        file.unlink()
+    again = colors()
+    np.testing.assert_allclose(again.pop(dirty.session_uid), [(0.5, 0.5, 0.5)], atol=1e-3)
+    assert all(np.allclose(again[uid], found[uid]) for uid in again)
+    assert baked == [4, 3]
+
+
+def test_files_in_use_are_kept(tmp_path, monkeypatch):
+    """The oldest files are removed, except those in use, while another process removes some of them too."""
+    monkeypatch.setattr(kept_files, "_MOST_KEPT", 2)
+    files = [tmp_path / f"{index}.npz" for index in range(5)]
+    for index, file in enumerate(files):
+        file.touch()
+        os.utime(file, (index, index))
+    stat, taken = type(tmp_path).stat, files[4]
+    monkeypatch.setattr(
+        type(tmp_path), "stat", lambda self, **how: stat(tmp_path / "gone" if self == taken else self, **how)
+    )
+    kept_files.remove_oldest(files[0], used={files[0]})
+    monkeypatch.undo()
+    assert sorted(tmp_path.iterdir()) == [files[0], files[2], files[3]]
+
+
 def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
     """A view starts one process for all surfaces, and has plain colors with a sentence until it ends and after an
     error.
@@ -140,14 +231,14 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
     depsgraph = bpy.context.evaluated_depsgraph_get()
     objects = [one.evaluated_get(depsgraph) for one in stage.objects if one.type == "MESH"]
-    assert surface_bakes.find(objects, None, for_render=False, waits=False) == {}
+    assert surface_bakes.find(objects, None, 1.0, for_render=False, waits=False) == {}
     (process,) = set(surface_bakes.process_cache.values())
     assert len(process.names) == len(surface_bakes.sentences()) == 2
     for _look in range(200):
         if surface_bakes.look() is None:
             break
         time.sleep(0.05)
-    assert surface_bakes.find(objects, None, for_render=False, waits=False) == {}
+    assert surface_bakes.find(objects, None, 1.0, for_render=False, waits=False) == {}
     assert all("no Cycles" in sentence for sentence in surface_bakes.sentences())
     assert len(set(surface_bakes.process_cache.values())) == 1
     mesh = next(one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.owner[0] == placed.session_uid)
@@ -156,7 +247,7 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
 
 def test_the_other_process_knows_its_commands():
     for verb in ("panorama", "bake_surfaces"):
-        words = [verb, "a.blend", "--out", "b", *(["--names", "[]"] if verb == "bake_surfaces" else [])]
+        words = [verb, "a.blend", "--out", "b", *(["--sources", "[]"] if verb == "bake_surfaces" else [])]
         assert callable(command_line.parser("vellus").parse_args(words).run)
 
 

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ....core.geometry.mesh import Faces
+from ...host import scene_time
 from ...host.caches import Cache
 from ...host.notices import can_be_drawn, name_of
 from .. import scene
@@ -158,8 +159,8 @@ def _bakes(depsgraph, viewport, override):
         for one in depsgraph.object_instances
         if one.object.type == "MESH" and one.show_self and _is_surface_seen(one, viewport)
     }
-    is_render = viewport is None
-    return surface_bakes.find(shown.values(), override, for_render=is_render, waits=is_render)
+    is_render, frame = viewport is None, scene_time.time_of(depsgraph.scene)
+    return surface_bakes.find(shown.values(), override, frame, for_render=is_render, waits=is_render)
 
 
 def split_clear(meshes):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files that are made once and kept: in the user's folder of the extension, or as long as Blender runs."""
 
+import os
 import tempfile
 from pathlib import Path
 
@@ -15,15 +16,24 @@ def folder(name):
     """Return the folder of files of a kind."""
     if preferences.is_extension():
         found = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path=name, create=True)
-        if found:  # empty if Blender could not create it, which it reports on the console
+        # Empty if Blender could not create it, which it reports on the console.
+        if found and os.access(found, os.W_OK):
             return Path(found)
     found = Path(bpy.app.tempdir or tempfile.gettempdir()) / f"vellus_{name}"
     found.mkdir(exist_ok=True)
     return found
 
 
-def remove_oldest(path):
-    """Remove the oldest files beside a file, of the same kind, if there are too many."""
-    files = sorted(path.parent.glob(f"*{path.suffix}"), key=lambda file: file.stat().st_mtime)
-    for file in files[:-_MOST_KEPT]:
+def remove_oldest(path, used=frozenset()):
+    """Remove the oldest files beside a file, of the same kind, if there are too many; `used` files stay."""
+    files = [file for file in path.parent.glob(f"*{path.suffix}") if file not in used]
+    for file in sorted(files, key=_time_of)[:-_MOST_KEPT]:
         file.unlink(missing_ok=True)
+
+
+def _time_of(file):
+    """Return the time of a file's last change [s], 0 if another process has removed it."""
+    try:
+        return file.stat().st_mtime
+    except OSError:
+        return 0.0

@@ -91,26 +91,36 @@ class Bake:
 
 
 class _Baking:
-    """A process that bakes objects; reason: why it failed, empty otherwise."""
+    """A process that bakes objects: {path of the pictures: evaluated object}.
 
-    def __init__(self, paths, objects, for_render):
-        self.reason, self._paths = "", paths
-        self.names = [name_of(one) for one in objects]
-        self._folder = tempfile.TemporaryDirectory(prefix=".", dir=paths[0].parent, ignore_cleanup_errors=True)
-        folder = Path(self._folder.name)
-        blend, originals = folder / "surfaces.blend", [one.original for one in objects]
-        words = ["bake_surfaces", str(blend), "--out", str(folder)]
-        words += ["--names", json.dumps([one.name for one in originals]), *(["--for-render"] if for_render else [])]
+    reasons: {path: why the object cannot be baked}.
+    """
+
+    def __init__(self, objects, frame, for_render):
+        self.reasons, self._names = {}, {path: name_of(one) for path, one in objects.items()}
+        originals = [one.original for one in objects.values()]
+        sources = [(_library_of(one), one.name) for one in originals]
+        words = ["--sources", json.dumps(sources), "--frame", repr(frame), *(["--for-render"] if for_render else [])]
         try:
-            bpy.data.libraries.write(str(blend), set(originals), path_remap="ABSOLUTE", fake_user=True)
-            self._process = OtherProcess(words, folder / "errors")
+            parent = next(iter(objects)).parent
+            self._folder = tempfile.TemporaryDirectory(prefix=".", dir=parent, ignore_cleanup_errors=True)
+            folder = Path(self._folder.name)
+            blend, local = folder / "surfaces.blend", {one for one in originals if one.library is None}
+            bpy.data.libraries.write(str(blend), local, path_remap="ABSOLUTE", fake_user=True)
+            self._process = OtherProcess(["bake_surfaces", str(blend), "--out", str(folder), *words], folder / "errors")
         except (OSError, RuntimeError) as error:
-            self._process, self.reason = None, cause_of(error)
+            self._process, self.reasons = None, dict.fromkeys(objects, cause_of(error))
 
     @property
     def is_running(self):
         """Whether it runs, or its end has not been handled yet."""
         return self._process is not None
+
+    @property
+    def names(self):
+        """Names of the objects that are being baked or cannot be baked, with the reason or an empty text."""
+        shown = self._names if self.is_running else self.reasons
+        return [(self._names[path], self.reasons.get(path, "")) for path in shown]
 
     def is_ended(self, waits):
         """Whether it has ended, after waiting if `waits`; the files are then in their places, or there is a reason."""
@@ -119,29 +129,42 @@ class _Baking:
         if self._process is None or self._process.is_running:
             return self._process is None
         complaint, self._process = self._process.complaint(), None
-        for index, path in enumerate(self._paths):
+        for index, path in enumerate(self._names):
+            made = Path(self._folder.name) / f"{index}.npz"
             try:
-                (Path(self._folder.name) / f"{index}.npz").replace(path)
+                made.replace(path)
             except OSError as error:
-                self.reason = complaint or cause_of(error)
+                refusal = made.with_suffix(".txt")
+                told = refusal.read_text("utf-8") if refusal.is_file() else complaint
+                self.reasons[path] = told or cause_of(error)
         self._folder.cleanup()
         return True
 
 
-def find(objects, override, for_render, waits):
+def _library_of(original):
+    """Return the path of the library of a linked object, "" for a local one."""
+    library = original.library
+    return "" if library is None else bpy.path.abspath(library.filepath, library=library.parent)
+
+
+def find(objects, override, frame, for_render, waits):
     """Return {session_uid of a mesh object: `Bake`} of evaluated objects whose materials need one.
 
-    override: the view layer's material; waits: return only once all are there. Without `waits` the last pictures of an
-    object, or none, stand in for those that are being baked.
+    override: the view layer's material; frame: the time of drivers of nodes; waits: return only once all are there.
+    Without `waits` the last pictures of an object, or none, stand in for those that are being baked.
     """
     wanted = {one.original.session_uid: one for one in objects if _needs_bake(one, override)}
     paths = {uid: _path_of(one) for uid, one in wanted.items()}
-    missing = [uid for uid, path in paths.items() if not path.is_file()]
-    _start([uid for uid in missing if process_cache.get(paths[uid].stem) is None], wanted, paths, for_render, waits)
-    for uid in missing:
-        baking = process_cache.get(paths[uid].stem)
-        if baking is not None and baking.is_ended(waits) and baking.reason:
-            say(f'Cycles cannot bake the materials of "{name_of(wanted[uid])}": {baking.reason}')
+    # Linked objects have common pictures.
+    missing = {path: wanted[uid] for uid, path in paths.items() if not path.is_file()}
+    _start({path: one for path, one in missing.items() if not _is_known(path)}, frame, for_render, waits)
+    for path, one in missing.items():
+        baking = process_cache.get(path.stem)
+        if baking is not None and baking.is_ended(waits) and path in baking.reasons:
+            say(f'Cycles cannot bake the materials of "{name_of(one)}": {baking.reasons[path]}')
+    if missing and paths:
+        kept_files.remove_oldest(next(iter(paths.values())), used=set(paths.values()))
+    bake_cache.make_room(len(paths))
     found = {}
     for uid, path in paths.items():
         path = last_cache.keep(uid, path) if path.is_file() else last_cache.get(uid)
@@ -164,14 +187,19 @@ def add_uv_map(mesh, name, uvs):
     return layer
 
 
-def _start(uids, objects, paths, for_render, waits):
-    """Start a process for objects; a view has one process, as dragged or played nodes change."""
-    if not uids or (not waits and _running()):
+def _is_known(path):
+    """Whether pictures without a file are being baked, or cannot be."""
+    baking = process_cache.get(path.stem)
+    return baking is not None and (baking.is_running or path in baking.reasons)
+
+
+def _start(objects, frame, for_render, waits):
+    """Start a process for {path: object}; a view has one process, as dragged or played nodes change."""
+    if not objects or (not waits and _running()):
         return
-    baking = _Baking([paths[uid] for uid in uids], [objects[uid] for uid in uids], for_render)
-    for uid in uids:
-        process_cache.keep(paths[uid].stem, baking)
-        kept_files.remove_oldest(paths[uid])
+    baking = _Baking(objects, frame, for_render)
+    for path in objects:
+        process_cache.keep(path.stem, baking)
     if not waits and not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
 
@@ -193,8 +221,8 @@ def sentences():
     failed = 'Cycles cannot bake the materials of "{name}": {reason}'
     found = []
     for baking in dict.fromkeys(process_cache.values()):
-        for name in baking.names if baking.is_running or baking.reason else ():
-            found.append(interface_text(text if baking.is_running else failed, name=name, reason=baking.reason))
+        for name, reason in baking.names:
+            found.append(interface_text(text if baking.is_running else failed, name=name, reason=reason))
     return found
 
 
@@ -204,7 +232,9 @@ def _running():
 
 def _needs_bake(mesh_object, override):
     materials = (override,) if override is not None else [slot.material for slot in mesh_object.material_slots]
-    return override is None and any(one is not None and unread_nodes.baked_labels(one) for one in materials)
+    if override is not None or not len(mesh_object.data.polygons):
+        return False
+    return any(one is not None and unread_nodes.baked_labels(one) for one in materials)
 
 
 def _path_of(mesh_object):
@@ -214,7 +244,7 @@ def _path_of(mesh_object):
     materials = [slot.material for slot in mesh_object.material_slots]
     found.update(repr([one and world_digest.digest_of(one) for one in materials]).encode())
     if any(_is_placed(one) for one in materials if one is not None):
-        found.update(repr(([tuple(row) for row in mesh_object.matrix_world], tuple(mesh_object.color))).encode())
+        found.update(repr(world_digest.settings_of(mesh_object)).encode("utf-8", "replace"))
     faces = scene.cached_faces(mesh_object.original, evaluated)
     found.update(np.ascontiguousarray(faces.corner_vertices))
     found.update(np.ascontiguousarray(faces.starts))
@@ -240,9 +270,13 @@ _COMPONENTS = {
 
 
 def _is_placed(material):
-    """Whether a material depends on the place of its object."""
-    kinds = {node.type for node in nodes_of(material.node_tree)} if material.node_tree else set()
-    return bool(kinds & {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"})
+    """Whether a material depends on the place, the name or custom properties of its object."""
+    return material.node_tree is not None and any(
+        one.type in {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"}
+        or (one.type == "ATTRIBUTE" and one.node.attribute_type != "GEOMETRY")
+        or (one.type == "TEX_COORD" and one.node.object is not None)
+        for one in nodes_of(material.node_tree)
+    )
 
 
 def _read(path):

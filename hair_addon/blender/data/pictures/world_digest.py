@@ -17,6 +17,13 @@ def digest_of(world):
     return hashlib.blake2b(repr(_of_tree(world.node_tree, ())).encode("utf-8", "replace"), digest_size=16).hexdigest()
 
 
+def settings_of(mesh_object):
+    """Return what nodes of materials read of an object: place, name, color, pass index, and custom properties."""
+    own = [(key, _of_value(value, (), 0)) for key, value in sorted(mesh_object.items())]
+    matrix = [tuple(row) for row in mesh_object.matrix_world]
+    return matrix, mesh_object.name, tuple(mesh_object.color), mesh_object.pass_index, own
+
+
 def _of_tree(tree, above):
     """Nodes and links of a tree, sorted, as a click on a node changes their order.
 

@@ -12,6 +12,7 @@ from ....core.geometry.faces import face_atlas
 from ...data import scene as blender_data
 from ...data.pictures import surface_bakes
 from ...data.pictures.shader_sockets import nodes_of
+from ...host import scene_time
 
 SIDE = 1024  # texels of a picture, more for meshes with many faces
 IMAGE_SIDE = 2048  # of materials with images
@@ -36,30 +37,53 @@ _COLORS = {
 _OTHERS = {"BSDF_TRANSPARENT": 0.0, "BSDF_GLASS": 0.0, "BSDF_REFRACTION": 0.0, "HOLDOUT": 0.0, "EMISSION": 1.0}
 
 
-def bake(path, names, for_render, out):
-    """Bake the materials of the named meshes of a .blend into .npz files OUT/0.npz, … Raises `HairError`.
+def bake(path, sources, frame, for_render, out):
+    """Bake the materials of meshes at a frame into .npz files OUT/0.npz, …; OUT/0.txt, … are the reasons why a mesh
+    cannot be baked. Raises `HairError` if files cannot be read.
 
+    sources: (path of the library of a linked object, or "" for the .blend at `path`; name of the object) of each mesh.
     Surfaces have the shape without modifiers that only deform, so that patterns stay in place on posed surfaces. Each
     file has `uvs` (C, 2) of the mesh's corners; `color` (H, W, 3), `roughness`, `metallic` and `weight` (H, W),
     the opaque part, float16; `normal` (H, W, 3) in tangent space, encoded from 0 to 1, empty without nodes of normals.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path)) as (_found, wanted):
-            wanted.objects = list(names)
+        objects = _loaded(path, sources)
         scene = bpy.context.scene
         _set_up(scene)
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise HairError(f"{path} cannot be baked: {cause_of(error)}.") from error
-    for found in wanted.objects:
+    for found in filter(None, objects):
         scene.collection.objects.link(found)
         _rest(found, for_render)
-    for index, found in enumerate(wanted.objects):
-        baked = _bake_object(scene, found)
+    scene_time.go_to_time(scene, frame)
+    for index, found in enumerate(objects):
+        try:
+            if found is None:
+                raise HairError("The file of its library does not contain it.")
+            baked = _bake_object(scene, found)
+        except (HairError, RuntimeError) as error:  # other objects are still baked
+            (Path(out) / f"{index}.txt").write_text(cause_of(error), "utf-8")
+            continue
         made = Path(out) / f"{index}.part.npz"
         with made.open("wb") as file:
             np.savez(file, **baked)
         os.replace(made, Path(out) / f"{index}.npz")
+
+
+def _loaded(path, sources):
+    """Return the object of each source, None if its file does not contain it.
+
+    Linked objects are read from their libraries, as a .blend contains only links to them.
+    """
+    found = [None] * len(sources)
+    for file in dict.fromkeys(library for library, _name in sources):
+        places = [index for index, (library, _name) in enumerate(sources) if library == file]
+        with bpy.data.libraries.load(file or str(path)) as (_names, wanted):
+            wanted.objects = [sources[index][1] for index in places]
+        for index, one in zip(places, wanted.objects, strict=True):
+            found[index] = one
+    return found
 
 
 def _set_up(scene):
@@ -95,20 +119,20 @@ def _bake_object(scene, found):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = found.evaluated_get(depsgraph)
     mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
-    placed = bpy.data.objects.new("Baked", mesh)
-    placed.matrix_world, placed.color, placed.pass_index = evaluated.matrix_world, found.color, found.pass_index
+    placed = _like(found, mesh, evaluated.matrix_world)
     scene.collection.objects.link(placed)
-    slots = [slot.material for slot in evaluated.material_slots]
-    mesh.materials.clear()
-    for material in slots:
-        mesh.materials.append(None if material is None else material.original.copy())
+    for index, slot in enumerate(evaluated.material_slots):
+        if index == len(mesh.materials):
+            mesh.materials.append(None)
+        # Removed and added slots would change the material indices of faces.
+        mesh.materials[index] = None if slot.material is None else slot.material.original.copy()
     materials = [material for material in mesh.materials if material is not None]
     has_images = any(node.type == "TEX_IMAGE" for one in materials for node in nodes_of(one.node_tree))
     uvs, side = face_atlas.face_atlas(
         blender_data.faces_of(mesh), blender_data.vertex_positions(mesh), IMAGE_SIDE if has_images else SIDE
     )
     if surface_bakes.add_uv_map(mesh, _ATLAS, uvs) is None:
-        raise HairError(f'"{found.name}" has the maximum number of UV maps: remove one.')
+        raise HairError("It has the maximum number of UV maps: remove one.")
     target = bpy.data.images.new("Baked", side, side, float_buffer=True, is_data=True)
     for material in materials:
         texture = material.node_tree.nodes.new("ShaderNodeTexImage")
@@ -131,6 +155,16 @@ def _bake_object(scene, found):
     return baked | {name: values.astype(np.float16) for name, values in surface.items()}
 
 
+def _like(found, mesh, matrix):
+    """Return an object with a mesh and all that Object Info and Attribute nodes read of another object."""
+    name, found.name = found.name, "Original"  # Random is a number of the name
+    placed = bpy.data.objects.new(name, mesh)
+    placed.matrix_world, placed.color, placed.pass_index = matrix, found.color, found.pass_index
+    for key, value in found.items():
+        placed[key] = value
+    return placed
+
+
 def _picture(target, kind):
     """Return (H, W, 3) float16, the lowest row first, of a bake of the active object into an image."""
     bpy.ops.object.bake(type=kind, margin=_MARGIN, margin_type="EXTEND", use_clear=True, normal_space="TANGENT")
@@ -143,9 +177,9 @@ def _emit(tree, switches, known):
     """Replace the shaders of a tree and of its groups by Emission nodes with their color, or with (roughness, metallic,
     1) if the Value nodes that are added to `switches` are 1.
     """
-    if tree is None or tree.name in known:
+    if tree is None or tree.as_pointer() in known:  # the trees of all materials have the same name
         return
-    known.add(tree.name)
+    known.add(tree.as_pointer())
     for node in list(tree.nodes):
         if node.type == "GROUP":
             _emit(node.node_tree, switches, known)
