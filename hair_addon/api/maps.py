@@ -105,13 +105,13 @@ def maps_of(hair: Curves) -> tuple[MapSettings, ...]:
 
 
 def clear_map(hair: Curves, setting: str) -> bool:
-    """Remove the map of a setting; returns whether there was one.
+    """Remove the map of a setting, and keep its curve from root to tip; returns whether there was a map.
 
     >>> api.clear_map(bpy.data.objects["Hair"], "look.color")
     True
     """
     varied_settings.require_varied_or_course(setting)
-    return blender.settings.map_items.remove(_editable(hair, setting).vellus, setting)
+    return blender.settings.map_items.clear(_editable(hair, setting).vellus, setting)
 
 
 def set_thickness_curve(hair: Curves, curve: str = "") -> None:

@@ -147,8 +147,19 @@ def keep(state, settings: MapSettings) -> VellusMap:
     return item
 
 
+def clear(state, setting: str) -> bool:
+    """Remove the map of a setting, and keep its curve from root to tip; returns whether there was a map."""
+    item = item_of(state, setting)
+    course = "" if item is None else ramp_nodes.text_of(item.course_tree)
+    if not course:
+        return remove(state, setting)
+    had_map = is_set(item)
+    keep(state, MapSettings(setting=setting, course=course))
+    return had_map
+
+
 def remove(state, setting: str) -> bool:
-    """Remove the map of a setting; returns whether there was one."""
+    """Remove the map and the curve of a setting; returns whether it had any."""
     for index, item in enumerate(state.maps):
         if item.setting == setting:
             mark_map(item, None)

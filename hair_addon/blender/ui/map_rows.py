@@ -40,7 +40,8 @@ def draw(layout, item, hair):
         _source_rows(layout, item, hair)
     if details is not None and details.has_course:
         _course_rows(layout, item)
-    layout.operator("vellus.remove_map", icon="X").setting = item.setting
+    if item.course_tree is None or map_items.is_set(item):
+        layout.operator("vellus.remove_map", icon="X").setting = item.setting
 
 
 def _details(item, hair):

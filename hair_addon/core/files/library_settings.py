@@ -42,9 +42,14 @@ def alone(settings: GroomSettings) -> tuple[GroomSettings, list[str]]:
         section: _without(getattr(settings, section), names, left) for section, names in _NAMES_OF_OTHERS.items()
     }
     styles = tuple(_without(style, _NAMES_OF_OTHERS_IN_STYLES, left) for style in settings.styles)
-    left += [one.source for one in settings.maps if one.kind in _OTHER_MAPS]
-    maps = tuple(one for one in settings.maps if one.kind not in _OTHER_MAPS)
-    return replace(settings, **sections, styles=styles, maps=maps), left
+    left += [one.source for one in settings.maps if one.kind in _OTHER_MAPS and one.has_source]
+    return replace(settings, **sections, styles=styles, maps=_without_sources(settings.maps, _OTHER_MAPS)), left
+
+
+def _without_sources(maps, kinds):
+    """Return maps, of some kinds only their curves from root to tip."""
+    kept = (one.without_source if one.kind in kinds else one for one in maps)
+    return tuple(one for one in kept if one.has_source or one.course)
 
 
 def _without(settings, names, left):
@@ -67,7 +72,7 @@ def renamed(settings: GroomSettings, names: Mapping[str, str]) -> GroomSettings:
         replace(one, source=names.get(one.source, one.source)) if one.kind in _MASK_MAPS else one
         for one in settings.maps
     )
-    maps = tuple(one for one in maps if one.source or one.kind not in _MASK_MAPS)
+    maps = tuple(found for one in maps for found in ((one,) if one.source else _without_sources((one,), _MASK_MAPS)))
     sections = {section: _renamed(getattr(settings, section), masks, names) for section, masks in _MASKS.items()}
     styles = tuple(_renamed(style, ("mask",), names) for style in settings.styles)
     return replace(settings, **sections, styles=styles, maps=maps)

@@ -47,6 +47,11 @@ class MapSettings(Settings):
         return self.kind in ("STRAND", "CLUMP") or self.source != ""
 
     @property
+    def without_source(self) -> "MapSettings":
+        """The curve of the setting from root to tip alone."""
+        return MapSettings(setting=self.setting, course=self.course)
+
+    @property
     def combination(self) -> Combination:
         """The `Combination` of the map with its setting."""
         return Combination(self.low, self.high, self.is_inverted, self.amount)

@@ -115,3 +115,15 @@ def test_maps_are_renamed_with_their_masks_and_leave_images_behind():
     assert library_settings.masks_of(alone) == ["top", "long"]
     found = library_settings.renamed(alone, {"top": "top.001", "long": ""})
     assert {one.setting: one.source for one in found.maps} == {"strands.thickness": "top.001", "look.melanin": ""}
+
+
+def test_curves_from_root_to_tip_leave_maps_behind():
+    """A curve stays where its setting's map is left out, or where it has no map."""
+    course = {"setting": "styles.Curl.radius", "course": "0:1 1:0.2"}
+    only = (MapSettings(**course),)
+    for source, names in (({}, []), ({"source": "Coat"}, ["Coat"])):
+        alone, left = library_settings.alone(GroomSettings(maps=(MapSettings(**course, **source),)))
+        assert (alone.maps, left) == (only, names)
+        assert library_settings.renamed(alone, {}).maps == only
+    masked = GroomSettings(maps=(MapSettings(**course, kind="GROUP", source="top"),))
+    assert library_settings.renamed(masked, {"top": ""}).maps == only

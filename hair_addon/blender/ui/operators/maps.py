@@ -190,7 +190,7 @@ def _first_ramp(hair, item):
 
 
 class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
-    """Remove the map: all strands have the value of the setting"""
+    """Remove the map: all strands have the value of the setting. Its curve from root to tip stays"""
 
     bl_idname = "vellus.remove_map"
     bl_label = "Remove Map"
@@ -201,7 +201,7 @@ class VELLUS_OT_remove_map(HairOperator, bpy.types.Operator):
         """Remove the map of the setting."""
         owner = _owner_of(context, self.setting)
         require_editable(owner)
-        map_items.remove(owner.vellus, self.setting)
+        map_items.clear(owner.vellus, self.setting)
 
 
 CLASSES = (

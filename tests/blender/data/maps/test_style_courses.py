@@ -109,9 +109,10 @@ def test_a_map_and_a_curve_multiply(curls):
     half = api.set_map(curls, RADIUS, "strand", low=0.5, high=0.5)
     assert half.course == FALLING
     both = points(curls)
-    api.clear_map(curls, RADIUS)
+    assert bpy.ops.vellus.remove_map(setting=RADIUS) == {"FINISHED"}
+    assert api.maps_of(curls) == (MapSettings(setting=RADIUS, course=FALLING),)
+    assert not api.clear_map(curls, RADIUS)  # there is only the curve
     curls.vellus.styles[0].curl.radius = 0.025
-    api.set_course(curls, RADIUS, FALLING)
     np.testing.assert_array_equal(points(curls), both)
     curls.vellus.styles[0].name = "Ringlets"
     bpy.ops.vellus.duplicate_style()
