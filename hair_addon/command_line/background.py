@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures by Cycles for views and renders: panoramas of worlds, and materials of meshes.
+"""Pictures by Cycles for views and renders: panoramas of worlds and lights, and materials of meshes.
 
 blender/data/pictures runs these commands in a process of its own. They are for internal use and not listed.
 """
@@ -14,9 +14,11 @@ blender = lazy.Package("..blender", __package__)
 def add(verbs):
     """Add the options of the commands."""
     panorama = verbs.add_parser("panorama")
-    panorama.add_argument("input", help="a .blend with one world")
-    panorama.add_argument("--out", required=True, help="the .exr")
+    panorama.add_argument("input", help="a .blend with one world, or with a light")
+    panorama.add_argument("--out", required=True, help="the .exr, or the .npz of a light")
     panorama.add_argument("--frame", type=float, default=1.0)
+    panorama.add_argument("--light", help="name of the light")
+    panorama.add_argument("--matrix", default="null", help="rows of the light's matrix, a JSON list")
     panorama.set_defaults(run=run, json=True, quiet=False, verbose=False)
     bake = verbs.add_parser("bake_surfaces")
     bake.add_argument("input", help="a .blend with the meshes")
@@ -28,8 +30,13 @@ def add(verbs):
 
 
 def run(given, console):
-    """Render a panorama of a file's world."""
-    blender.io.pictures.world_panorama.render(given.input, given.frame, given.out)
+    """Render a panorama of a file's world, or of one of its lights."""
+    pictures = blender.io.pictures
+    if given.light is None:
+        pictures.world_panorama.render(given.input, given.frame, given.out)
+    else:
+        matrix = json.loads(given.matrix)
+        pictures.light_panorama.render(given.input, given.light, matrix, given.frame, given.out)
     console.result({"panorama": given.out}, "")
 
 

@@ -9,7 +9,7 @@ from mathutils import Euler, Matrix
 
 from ...core.errors import HairError
 from ...core.imaging import lamps
-from ..data.pictures import light_linking, world_panoramas
+from ..data.pictures import light_linking, light_panoramas, world_panoramas
 from ..data.pictures.rendered_instances import is_rendered
 from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
@@ -29,16 +29,21 @@ _RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
 NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), []  # the result of `read_lights` without lights
 
 
-def read_lights(depsgraph, for_render):
+def read_lights(depsgraph, for_render, places=()):
     """Return ((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links).
 
-    The links are from `light_linking.read_links`. Lights with non-finite values are skipped with a message.
+    The links are from `light_linking.read_links`. Lights with non-finite values are skipped with a message. places:
+    (P, 3) of hair, for lights whose nodes Cycles renders. Raises `HairError` if it cannot, for a render.
     """
+    time = scene_time.time_of(depsgraph.scene_eval)
     lights, links = [], []
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and _shines(instance, for_render):
             with np.errstate(all="ignore"):  # values are checked below
-                light = _read_light(instance.object.data, np.array(instance.matrix_world))
+                matrix = np.array(instance.matrix_world)
+                light = _read_light(
+                    instance.object.data, matrix, _panorama_of_light(instance, time, for_render), places
+                )
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
                 light["group"] = group_of(instance.object, depsgraph.view_layer)
                 lights.append(light)
@@ -56,14 +61,25 @@ def _shines(instance, for_render):
     return (not for_render or is_rendered(instance)) and any(getattr(instance.object, rays) for rays in _RAYS)
 
 
-def _read_light(light, matrix):
+def _panorama_of_light(instance, time, waits):
+    """Return the `Panorama` of a light instance, None without one; waits: as of `light_panoramas.find`."""
+    try:
+        return light_panoramas.find(instance.object.data, np.array(instance.matrix_world), time, waits)
+    except HairError as error:
+        if waits:
+            raise
+        say(str(error))
+        return None
+
+
+def _read_light(light, matrix, panorama, places):
     record = uniforms.LIGHT.record()
     record["kind"] = KINDS[light.type]
     record["position"][:3] = matrix[:3, 3]
     if light.type != "POINT":
         axis = -matrix[:3, 2]  # a light shines along its local -Z
         record["axis"][:3] = axis / np.linalg.norm(axis)
-    record["power"][:3] = _color(light) * light.energy * 2.0**light.exposure
+    record["power"][:3] = _color(light, panorama, matrix, places) * light.energy * 2.0**light.exposure
     if not light.normalize:
         record["power"][:3] *= _emitting_area(light, matrix)
     record["casts_shadow"] = light.use_shadow
@@ -83,11 +99,13 @@ def _read_light(light, matrix):
     return record
 
 
-def _color(light):
+def _color(light, panorama, matrix, places):
     """RGB: the light's color times the emission of its nodes."""
     color = np.array(light.color)
     if light.use_temperature:
         color = color * light.temperature_color
+    if panorama is not None:
+        return color * panorama.factor(matrix, places)
     emission = shown_shader(light.node_tree, ["EMISSION"])
     if emission is None:
         return color

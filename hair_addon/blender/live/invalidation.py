@@ -6,7 +6,15 @@
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
 from ..data.maps import image_pixels, sources
-from ..data.pictures import drawn_meshes, root_colors, surface_bakes, surface_means, unread_nodes, world_panoramas
+from ..data.pictures import (
+    drawn_meshes,
+    light_panoramas,
+    root_colors,
+    surface_bakes,
+    surface_means,
+    unread_nodes,
+    world_panoramas,
+)
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
@@ -108,6 +116,7 @@ OTHERS = (
     surface_bakes.process_cache,
     surface_bakes.bake_cache,
     surface_bakes.last_cache,
+    light_panoramas.picture_cache,
     world_panoramas.process_cache,
     world_panoramas.last_cache,
     guide_lines.hue_cache,

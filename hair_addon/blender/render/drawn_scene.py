@@ -265,8 +265,15 @@ def _lamps_of(light, depsgraph, for_render, world, hair_receivers):
     if light.kind != viewport_shading.SCENE:
         found, ambient = studio_lights.lamps_of(light.lights, light.has_highlights)
         return scene_lights.of_studio(found, world.color + ambient)
-    found, links = blender_lights.read_lights(depsgraph, for_render) if light.has_lights else blender_lights.NO_LIGHTS
-    return scene_lights.gather(found, links, world, hair_receivers)
+    if not light.has_lights:
+        return scene_lights.gather(*blender_lights.NO_LIGHTS, world, hair_receivers)
+    return _scene_lights(depsgraph, for_render, world, hair_receivers)
+
+
+def _scene_lights(depsgraph, for_render, world, hair_receivers):
+    """Return the `SceneLights` of the lights of a scene and a `World`."""
+    places = np.concatenate([np.zeros((0, 3)), *(receiver.places for receiver in hair_receivers)])
+    return scene_lights.gather(*blender_lights.read_lights(depsgraph, for_render, places), world, hair_receivers)
 
 
 def _are_made(hair):
@@ -347,7 +354,7 @@ def read_render(depsgraph, known, refused, noted, progress=no_progress):
     progress("Reading lights", 0.5)
     world = blender_lights.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
-    lamps = scene_lights.gather(*blender_lights.read_lights(depsgraph, for_render=True), world, hair_receivers)
+    lamps = _scene_lights(depsgraph, True, world, hair_receivers)
     hair_seen, surfaces_seen = visibility(unlit)
     progress("Drawing shadows", 0.7)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import shader_sockets, unread_nodes
+from hair_addon.blender.data.pictures import light_panoramas, shader_sockets, unread_nodes
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.render.frames.engine import NAME
 from tests.support.commands import run_here
@@ -96,10 +96,11 @@ def test_other_nodes_of_lights_are_named(lamp):
     link(light.node_tree, "ShaderNodeTexNoise", emission.inputs["Color"])
     falloff = link(light.node_tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
     (sentence,) = told()
-    assert sentence.endswith(f'as values: "{light.name}" (Noise Texture).')
+    assert sentence.endswith(f'toward hair: "{light.name}" (Noise Texture).')
     light.node_tree.links.new(falloff.outputs["Linear"], emission.inputs["Strength"])
-    (sentence,) = told()
-    assert sentence.endswith(f'as values: "{light.name}" (Noise Texture, Light Falloff).')
+    sentence, about_distance = told()
+    assert sentence.endswith(f'toward hair: "{light.name}" (Noise Texture, Light Falloff).')
+    assert about_distance.endswith(f'at all distances: "{light.name}" (Light Falloff).')
     bpy.context.object.hide_render = True
     assert told() == []
 
@@ -120,19 +121,20 @@ def test_each_math_node_is_computed_once(lamp, monkeypatch):
     assert len(computed) == 8
 
 
-def test_very_long_chains_and_very_large_numbers_are_not_read(lamp):
+def test_very_long_chains_and_very_large_numbers_are_not_read(lamp, monkeypatch):
     """Hundreds of Math nodes after one another, and a number that GPUs cannot store, are named."""
     light, emission = lamp
+    monkeypatch.setattr(light_panoramas, "find", lambda *_light: None)
     first = node = link(light.node_tree, "ShaderNodeMath", emission.inputs["Strength"])
     for _sum in range(600):
         node = link(light.node_tree, "ShaderNodeMath", node.inputs[0])
     (sentence,) = told()
-    assert sentence.endswith(f'as values: "{light.name}" (Math).')
+    assert sentence.endswith(f'toward hair: "{light.name}" (Math).')
     light.node_tree.links.remove(first.inputs[0].links[0])
     assert told() == []
     first.operation, first.inputs[0].default_value, first.inputs[1].default_value = "MULTIPLY", 1e30, 1e30
     (sentence,) = told()
-    assert sentence.endswith(f'as values: "{light.name}" (Math).')
+    assert sentence.endswith(f'toward hair: "{light.name}" (Math).')
     assert np.isfinite(record()["power"]).all()
 
 

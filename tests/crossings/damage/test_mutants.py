@@ -55,6 +55,8 @@ OTHERS = {
     "blender/data/pictures/surface_bakes.py": "pictures that another process has written; damaged ones are removed",
     "command_line/background.py": "names from the process that runs it",
     "blender/io/pictures/surface_bake.py": "the surfaces that another process has written for it",
+    "blender/data/pictures/light_panoramas.py": "panoramas that another process has written; damaged ones are removed",
+    "blender/io/pictures/light_panorama.py": "the light that another process has written for it",
     "blender/io/pictures/world_panorama.py": "the world that another process has written for it",
 }
 

@@ -4,15 +4,14 @@
 from ...host.caches import Cache
 from ...host.notices import name_of
 from . import surface_materials
-from .shader_sockets import ShaderInput
+from .shader_sockets import ShaderInput, nodes_of
 
 _MOST = 3  # names in a sentence
 
 sentence_cache = Cache()  # session_uid of a scene → `sentences` of it
 
-_OF_LIGHTS = (
-    "Nodes of lights have no effect in Vellus, except Color and Strength of an Emission node, as values: {names}."
-)
+_OF_LIGHTS = "Cycles renders these nodes of lights. Hair and surfaces receive the mean light toward hair: {names}."
+_OF_FALLOFFS = "Light Falloff nodes have the strength of Quadratic without Smooth, at all distances: {names}."
 _OF_MATERIALS = "Only values of these inputs of surfaces' shaders are read, not the nodes: {names}."
 _OF_BAKED = "Cycles bakes these nodes of materials on surfaces: {names}."
 
@@ -28,7 +27,8 @@ def sentences(scene):
     lights = {one.data for one in objects if one.type == "LIGHT"}
     materials = {slot.material for one in objects if one.type == "MESH" for slot in one.material_slots}
     found = (
-        (_OF_LIGHTS, {light: _unread_of(light.node_tree, _inputs_of_light) for light in lights}),
+        (_OF_LIGHTS, {light: labels_of_light(light) for light in lights}),
+        (_OF_FALLOFFS, {light: _falloffs_of(light) for light in lights}),
         (_OF_BAKED, {one: baked_labels(one) for one in materials if one is not None}),
         (_OF_MATERIALS, {one: _unread_values(one) for one in materials if one is not None}),
     )
@@ -67,6 +67,25 @@ def _reads_picture(shader_input):
     if found is not None and found.type == "NORMAL_MAP" and found.node.space == "TANGENT":
         return surface_materials.reads_image(found["Color"]) or found["Color"].constant() is not None
     return surface_materials.reads_image(shader_input)
+
+
+def labels_of_light(light):
+    """Return the labels of the nodes for which Cycles renders a panorama of a light; empty if it is read without."""
+    return _unread_of(light.node_tree, _inputs_of_light)
+
+
+def _falloffs_of(light):
+    """Return the labels of nodes by which a light has another falloff than the square of the distance."""
+    if light.node_tree is None or not labels_of_light(light):
+        return []
+    falloffs = [found for found in nodes_of(light.node_tree) if found.type == "LIGHT_FALLOFF"]
+    return [found.node.bl_label for found in falloffs if _is_other_falloff(found)]
+
+
+def _is_other_falloff(found):
+    return found["Smooth"].constant() != 0.0 or any(
+        output.is_linked for output in found.node.outputs if output.name != "Quadratic"
+    )
 
 
 def _inputs_of_light(shader):

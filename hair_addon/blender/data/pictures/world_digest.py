@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A digest of the nodes of a world or a material: equal for those that look the same."""
+"""A digest of the nodes of a world, a light or a material: equal for those that look the same."""
 
 import hashlib
 from pathlib import Path
@@ -11,9 +11,7 @@ _LAYOUT = {"rna_type", "name", "label", "is_active_output", "debug_zone_body_laz
 
 
 def digest_of(world):
-    """Return a digest of the nodes of a world or material, evaluated or not, with their settings, groups, images and
-    objects.
-    """
+    """Return a digest of the nodes, settings, groups and images of a world, light or material, evaluated or not."""
     return hashlib.blake2b(repr(_of_tree(world.node_tree, ())).encode("utf-8", "replace"), digest_size=16).hexdigest()
 
 
@@ -48,6 +46,8 @@ def _of_node(node, above):
         for socket in (*node.inputs, *node.outputs)
         if hasattr(socket, "default_value")
     ]
+    if node.type == "TEX_IES" and node.mode == "EXTERNAL":
+        values.append(_of_file(Path(bpy.path.abspath(node.filepath, library=node.id_data.library))))
     return values, sockets, getattr(node, "is_active_output", None)
 
 
@@ -63,6 +63,8 @@ def _of_value(value, above, depth):
         return _of_image(value)
     if isinstance(value, bpy.types.Object):
         return value.name, [tuple(row) for row in value.matrix_world]
+    if isinstance(value, bpy.types.Text):
+        return value.as_string()
     if isinstance(value, bpy.types.ID):
         return type(value).__name__, value.name
     if depth > _DEEPEST:
@@ -82,9 +84,12 @@ def _of_image(image):
         return *described, hashlib.blake2b(image.packed_file.data, digest_size=16).hexdigest()
     if image.source == "GENERATED":
         return *described, image.generated_type, tuple(image.generated_color)
-    path = Path(bpy.path.abspath(image.filepath, library=image.library))
+    return *described, *_of_file(Path(bpy.path.abspath(image.filepath, library=image.library)))
+
+
+def _of_file(path):
     try:
         status = path.stat()
     except OSError:
-        return *described, str(path)
-    return *described, str(path), status.st_mtime_ns, status.st_size
+        return (str(path),)
+    return str(path), status.st_mtime_ns, status.st_size

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panoramas of worlds whose nodes Vellus does not read: Cycles renders them once, in another process.
+"""Panoramas of worlds and lights whose nodes Vellus does not read: Cycles renders them once, in another process.
 
 Panoramas are kept by the digest of the nodes: in the user's folder of the extension, or as long as Blender runs.
 """
@@ -20,21 +20,22 @@ _PATIENCE = 300.0  # [s] for a panorama
 _LOOK = 0.25  # [s] between checks of processes
 
 process_cache = Cache()  # digest → _Rendering: running, or failed
-last_cache = Cache()  # session_uid of a world → the last panorama of any of its nodes
+last_cache = Cache()  # session_uid of a world or light → the last panorama of any of its nodes
 
 
 class _Rendering:
     """A panorama that another process renders; reason: why it failed, empty otherwise."""
 
-    def __init__(self, world, path, frame):
-        self.reason, self._path, self.world = "", path, name_of(world)
+    def __init__(self, owner, path, frame, options):
+        self.reason, self._path, self.name = "", path, name_of(owner)
+        self.is_world = isinstance(owner, bpy.types.World)
         # Beside the path, as a file cannot be renamed to another file system.
         self._folder = tempfile.TemporaryDirectory(prefix=".", dir=path.parent, ignore_cleanup_errors=True)
         folder = Path(self._folder.name)
-        blend, self._made = folder / "world.blend", folder / "world.exr"
-        words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame))]
+        blend, self._made = folder / "owner.blend", folder / f"panorama{path.suffix}"
+        words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame)), *options]
         try:
-            bpy.data.libraries.write(str(blend), {world.original}, path_remap="ABSOLUTE", fake_user=True)
+            bpy.data.libraries.write(str(blend), {owner.original}, path_remap="ABSOLUTE", fake_user=True)
             self._process = OtherProcess(words, folder / "errors")
         except (OSError, RuntimeError) as error:
             self._process, self.reason = None, cause_of(error)
@@ -64,52 +65,72 @@ def file_of(world, frame, waits):
 
     waits: return only once it is there. Raises `HairError` if it cannot be rendered.
     """
-    digest = world_digest.digest_of(world)
-    path, uid = kept_files.folder("worlds") / f"{digest}.exr", world.original.session_uid
+    path = kept_files.folder("worlds") / f"{world_digest.digest_of(world)}.exr"
+    return kept_or_rendered(world, path, frame, waits)
+
+
+def kept_or_rendered(owner, path, frame, waits, options=()):
+    """Return the path of the panorama of a world or light, whose name is a digest; None while it is rendered.
+
+    waits: as of `file_of`; options: of the command that renders. Raises `HairError` if it cannot be rendered.
+    """
+    digest, uid = path.stem, owner.original.session_uid
     if path.is_file():
         process_cache.invalidate(digest)
         return last_cache.keep(uid, path)
     rendering = process_cache.get(digest)
     if rendering is None and (waits or not _running()):  # a view has one process, as dragged or played nodes change
-        rendering = process_cache.keep(digest, _Rendering(world, path, frame))
+        rendering = process_cache.keep(digest, _Rendering(owner, path, frame, options))
     if rendering is None or not rendering.is_ended(waits):
         if not bpy.app.timers.is_registered(look):
             bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
         return None
     if rendering.reason:
-        sentence = 'Cycles cannot render the nodes of the world "{world}": {reason}'
-        raise HairError(sentence, world=rendering.world, reason=rendering.reason)
+        sentence = 'Cycles cannot render the nodes of the light "{light}": {reason}'
+        if rendering.is_world:
+            sentence = 'Cycles cannot render the nodes of the world "{world}": {reason}'
+        raise HairError(sentence, world=rendering.name, light=rendering.name, reason=rendering.reason)
     kept_files.remove_oldest(path)
     process_cache.invalidate(digest)
     return last_cache.keep(uid, path)
 
 
-def last_of(world):
-    """Return the last panorama of a world, with other nodes, for views while its next one is rendered; None without
-    one.
+def last_of(owner):
+    """Return the last panorama of a world or light, with other nodes, for views while its next one is rendered; None
+    without one.
     """
-    path = last_cache.get(world.original.session_uid)
+    path = last_cache.get(owner.original.session_uid)
     return path if path is not None and path.is_file() else None
 
 
 def sentences():
     """Translated sentences about panoramas that are rendered now, for panels."""
-    return [
-        interface_text(
-            'Cycles renders the nodes of the world "{world}" as a panorama. '
-            "Until it is ready, views have the last one, or the viewport color.",
-            world=name,
-        )
-        for name in sorted({one.world for one in _running()})
-    ]
+    named = sorted({(one.name, one.is_world) for one in _running()})
+    return [_sentence_of_world(name) if is_world else _sentence_of_light(name) for name, is_world in named]
+
+
+def _sentence_of_world(name):
+    return interface_text(
+        'Cycles renders the nodes of the world "{world}" as a panorama. '
+        "Until it is ready, views have the last one, or the viewport color.",
+        world=name,
+    )
+
+
+def _sentence_of_light(name):
+    return interface_text(
+        'Cycles renders the nodes of the light "{light}" as a panorama. '
+        "Until it is ready, views have the last one, or the light without nodes.",
+        light=name,
+    )
 
 
 def look():
     """Timer: show finished panoramas. Returns the time to the next check [s], None after the last."""
     ended = [one.is_ended(waits=False) for one in _running()]
     if any(ended):
-        for world in bpy.data.worlds:
-            world.update_tag()
+        for owner in (*bpy.data.worlds, *bpy.data.lights):
+            owner.update_tag()
         redraw_panels()
     return _LOOK if _running() else None
 

@@ -33,18 +33,24 @@ def render(path, frame, out):
         scene.render.engine = "CYCLES"
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
-    _replace_light_paths(scene.world.node_tree, set())
-    camera = bpy.data.cameras.new("Panorama")
-    camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
-    scene.camera = bpy.data.objects.new("Panorama", camera)
-    scene.camera.rotation_euler = 0.5 * math.pi, 0.0, -0.5 * math.pi  # looks along +x, z up
-    scene.collection.objects.link(scene.camera)
-    _set_up(scene, SUN_SAMPLES if _has_sun(scene.world.node_tree) else SAMPLES)
+    replace_light_paths(scene.world.node_tree, set())
+    add_camera(scene)
+    set_up(scene, SUN_SAMPLES if _has_sun(scene.world.node_tree) else SAMPLES)
     scene_time.go_to_time(scene, frame)
     out = Path(out)
     scene.render.filepath = str(out.with_suffix(".part.exr"))
     bpy.ops.render.render(write_still=True)
     os.replace(scene.render.filepath, out)
+
+
+def add_camera(scene):
+    """Add a camera of all directions at the origin, looking along +x, and return its object."""
+    camera = bpy.data.cameras.new("Panorama")
+    camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+    scene.camera = bpy.data.objects.new("Panorama", camera)
+    scene.camera.rotation_euler = 0.5 * math.pi, 0.0, -0.5 * math.pi  # z up
+    scene.collection.objects.link(scene.camera)
+    return scene.camera
 
 
 def _has_sun(tree):
@@ -53,25 +59,26 @@ def _has_sun(tree):
     return any(sky.sun_disc and sky.sky_type.endswith("SCATTERING") for sky in skies)
 
 
-def _set_up(scene, samples):
+def set_up(scene, samples, size=SIZE):
+    """Set a scene's picture: linear EXR of all light, with `samples` and without filters."""
     cycles, render = scene.cycles, scene.render
     cycles.device, cycles.samples = "CPU", samples
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"  # so that pixels receive all light of the sun
-    (render.resolution_x, render.resolution_y), render.resolution_percentage = SIZE, 100
+    (render.resolution_x, render.resolution_y), render.resolution_percentage = size, 100
     render.film_transparent = render.use_motion_blur = render.use_compositing = render.use_sequencer = False
     picture = render.image_settings
     picture.file_format, picture.color_depth, picture.exr_codec = "OPEN_EXR", "32", "ZIP"
 
 
-def _replace_light_paths(tree, known):
+def replace_light_paths(tree, known):
     """Let nodes read constants in place of Light Path nodes; known: trees that are done."""
     if tree is None or tree.name in known:
         return
     known.add(tree.name)
     for node in list(tree.nodes):
         if node.type == "GROUP":
-            _replace_light_paths(node.node_tree, known)
+            replace_light_paths(node.node_tree, known)
         if node.type != "LIGHT_PATH":
             continue
         for output in node.outputs:

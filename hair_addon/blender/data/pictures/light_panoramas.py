@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light of lamps whose nodes Vellus does not read: Cycles renders a panorama of it once, and hair receives its mean."""
+
+import hashlib
+import json
+import zipfile
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...host.caches import Cache
+from . import kept_files, unread_nodes, world_digest, world_panoramas
+from .shader_sockets import nodes_of
+
+picture_cache = Cache(capacity=64)  # path → `Panorama`
+
+# Settings of lights that the panorama depends on, beside the nodes.
+_SETTINGS = ("type", "shadow_soft_size", "spot_size", "spot_blend", "shape", "size", "size_y", "spread", "angle")
+_WORLD_NODES = {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"}  # which depend on the light's place
+
+
+@dataclass(frozen=True, eq=False)
+class Panorama:
+    """Light in the directions of a lamp's axes, by latitude from below and by longitude.
+
+    lit: (H, W, 3), with nodes; plain: (H, W), without them; in the same unit.
+    """
+
+    lit: np.ndarray
+    plain: np.ndarray
+
+    def factor(self, matrix, places):
+        """Return RGB, the light that nodes let arrive at places (P, 3) relative to that without them, in the mean.
+
+        matrix: (4, 4) of the lamp. Without places or light at these, the mean of all directions.
+        """
+        lit, plain = self._arriving(matrix, places)
+        if not plain > 0.0:
+            rows = len(self.plain)
+            widths = np.cos(np.pi * ((np.arange(rows) + 0.5) / rows - 0.5))  # of texels
+            lit, plain = np.einsum("h,hwc->c", widths, self.lit), np.einsum("h,hw->", widths, self.plain)
+        return lit / plain if plain > 0.0 else np.zeros(3)
+
+    def _arriving(self, matrix, places):
+        offsets = np.reshape(places, (-1, 3)) - matrix[:3, 3]
+        axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+        distances = np.maximum(np.linalg.norm(offsets, axis=1), 1e-6)
+        x, y, z = ((offsets @ axes) / distances[:, None]).T
+        height, width = self.plain.shape
+        column = width * (0.5 - np.arctan2(y, x) / (2.0 * np.pi)) - 0.5
+        row = np.clip(height * (0.5 + np.arcsin(np.clip(z, -1.0, 1.0)) / np.pi) - 0.5, 0.0, height - 1.0)
+        left, below = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), height - 2)
+        across, up = column - left, row - below
+        lit, plain = np.zeros(3), 0.0
+        for step_up, step_across in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            part = (up if step_up else 1.0 - up) * (across if step_across else 1.0 - across) / distances**2
+            texel = below + step_up, (left + step_across) % width
+            lit, plain = lit + part @ self.lit[texel], plain + part @ self.plain[texel]
+        return lit, plain
+
+
+def find(light, matrix, frame, waits):
+    """Return the `Panorama` of an evaluated light at a frame; None if Vellus reads its nodes.
+
+    waits: for the panorama; else the last one of the light, or None, until it is rendered. Raises `HairError`.
+    """
+    if light.node_tree is None or not unread_nodes.labels_of_light(light):
+        return None
+    is_placed = any(node.type in _WORLD_NODES for node in nodes_of(light.node_tree))
+    rows = (matrix if is_placed else np.eye(4)).tolist()
+    found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
+    found.update(repr((rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
+    path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
+    options = ["--light", light.original.name, "--matrix", json.dumps(rows)]
+    path = world_panoramas.kept_or_rendered(light, path, frame, waits, options) or world_panoramas.last_of(light)
+    return None if path is None else picture_cache.get(path, lambda: _read(path))
+
+
+def _read(path):
+    """Return the `Panorama` of a file; None if it is damaged, and it is rendered again."""
+    try:
+        with np.load(path) as found:
+            lit, plain = found["lit"].astype(float), found["plain"].astype(float)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        path.unlink(missing_ok=True)
+        return None
+    return Panorama(lit, plain)

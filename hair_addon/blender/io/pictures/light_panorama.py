@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rendering of a light by Cycles, as a panorama of the light that it sends in all directions."""
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ....core.errors import HairError, cause_of
+from ...data.pictures import shader_sockets
+from ...host import scene_time
+from . import world_panorama
+
+SIZE = 256, 128  # pixels
+SAMPLES = 32  # per pixel
+_FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
+_ENERGY = 1e6  # of the light, for pixels of about one
+
+# Settings of a light that Vellus reads beside its nodes, by which Cycles would multiply the panorama.
+_PLAIN = {"color": (1.0, 1.0, 1.0), "use_temperature": False, "exposure": 0.0, "energy": _ENERGY, "use_shadow": False}
+
+
+def render(path, name, matrix, frame, out):
+    """Render a light of a .blend, turned and placed by a matrix (4, 4), at a frame into an .npz. Raises `HairError`.
+
+    `lit` (H, W, 3) and `plain` (H, W): radiance of a white sphere around the light with its nodes and without them, in
+    directions of the light's own axes, from below to above. A sun lights the sphere through its wall.
+    """
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        with bpy.data.libraries.load(str(path)) as (_found, wanted):
+            wanted.lights = [name]
+        scene = bpy.context.scene
+        scene.render.engine = "CYCLES"
+        (light,) = wanted.lights
+        tree = light.node_tree
+    except (OSError, RuntimeError, TypeError, ValueError, AttributeError) as error:
+        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
+    for setting, value in _PLAIN.items():
+        setattr(light, setting, value)
+    world_panorama.replace_light_paths(tree, set())
+    _replace_falloffs(tree)
+    matrix = Matrix(matrix)
+    lamp = bpy.data.objects.new("Light", light)
+    scene.collection.objects.link(lamp)
+    lamp.matrix_world = matrix
+    camera = world_panorama.add_camera(scene)
+    camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
+    size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
+    camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
+    world_panorama.set_up(scene, SAMPLES, SIZE)
+    scene.cycles.max_bounces = 0
+    scene_time.go_to_time(scene, frame)
+    part = Path(out).with_suffix(".part.exr")
+    lit = _picture(scene, part)
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Strength"].default_value = 1.0
+    tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    plain = _picture(scene, part)
+    np.savez(part.with_suffix(".npz"), lit=lit, plain=plain.mean(axis=-1))
+    part.unlink()
+    os.replace(part.with_suffix(".npz"), out)
+
+
+def _picture(scene, path):
+    """Render (H, W, 3) float32, the lowest row first."""
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path), check_existing=False)
+    pixels = np.empty(4 * SIZE[0] * SIZE[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    return pixels.reshape(SIZE[1], SIZE[0], 4)[..., :3]
+
+
+def _add_sphere(radius, center):
+    """Add a white sphere; returns its radius."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=radius, location=center)
+    mesh = bpy.context.object.data
+    mesh.shade_smooth()
+    material = bpy.data.materials.new("White")
+    material.node_tree.nodes.clear()
+    output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    diffuse = material.node_tree.nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = 1.0, 1.0, 1.0, 1.0
+    material.node_tree.links.new(diffuse.outputs[0], output.inputs["Surface"])
+    mesh.materials.append(material)
+    return radius
+
+
+def _replace_falloffs(tree):
+    """Let nodes read the strength of Light Falloff nodes: a panorama has no distances."""
+    for found in list(shader_sockets.nodes_of(tree)):
+        if found.type != "LIGHT_FALLOFF":
+            continue
+        owner, strength = found.node.id_data, found.node.inputs["Strength"]
+        link = next(iter(strength.links), None)
+        for target in [one.to_socket for output in found.node.outputs for one in output.links]:
+            source = link.from_socket if link else owner.nodes.new("ShaderNodeValue").outputs[0]
+            if not link:
+                source.default_value = strength.default_value
+            owner.links.new(source, target)
