@@ -210,7 +210,7 @@ OTHERS = {
     *("load_groom_settings", "mirror_guides", "move_style", "pick_hair", "play_dynamics", "remove_delivery"),
     *("remove_look", "remove_style", "remove_style_preset", "render_picture", "save_look", "save_style_preset"),
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),
-    *("gather_guides", "paint_flow", "update_hair", "use_points", "use_uv_map"),
+    *("gather_guides", "paint_flow", "size_flow_brush", "update_hair", "use_points", "use_uv_map"),
     *("save_selection", "select_saved", "remove_selection"),
 }
 CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]

@@ -32,9 +32,11 @@ def radii(on_gpu):
 
 
 def tolerance(points):
-    """Return (S, 1, 1): the tolerance of coordinates of points (S, P, 3)."""
+    """Return (S, 1, 1): the tolerance of coordinates of points (S, P, 3): half a step, and the rounding of positions
+    and of offsets.
+    """
     reach = np.abs(points - points[:, :1]).max(axis=(1, 2), keepdims=True)
-    return 2.0**-20 * reach + 2.0**-22 * np.abs(points).max(axis=(1, 2), keepdims=True)
+    return 2.0**-20 * reach + 2.0**-22 * (np.abs(points).max(axis=(1, 2), keepdims=True) + reach)
 
 
 def are_drawn(found, points):
