@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         guide_maps,
         hair_memory,
         hidden_hair,
+        mapped_wetness,
         pipeline,
         read_surfaces,
         reused_roots,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         strand_thickness,
         styled_hair,
         varied_guides,
+        varied_strands,
         varied_styles,
         writing,
     )

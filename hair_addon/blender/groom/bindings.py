@@ -60,7 +60,8 @@ class BoundHair:
     is_behind: bool = False  # whether only the display, not `points`, has followed `guides`
     thickness: np.ndarray | None = None  # (S,) float32 factors of radii by a map, None without it
     course: np.ndarray | None = None  # (N,) float32 factors of the radius from root to tip, None without a ramp
-    map_status: str = ""  # sentence about the map of the thickness
+    map_status: str = ""  # sentence about the maps of thickness and wetness
+    mapped_wetness: np.ndarray | None = None  # (S,) float32 by the map of the look and by styles, None without the map
 
     @property
     def points(self) -> np.ndarray:
@@ -184,16 +185,27 @@ class BoundHair:
     def thicken(self, thickness: np.ndarray | None, map_status: str = "", course: np.ndarray | None = None) -> None:
         """Multiply the radii of strands by factors (S,) float32; None for 1.
 
-        map_status: sentence about their map; course: (N,) float32 factors from root to tip, None for the taper of the
-        settings.
+        map_status: sentence about maps of strands; course: (N,) float32 factors from root to tip, None for the taper
+        of the settings.
         """
-        is_same = map_status == self.map_status and is_same_thickness(course, self.course)
-        if is_same and is_same_thickness(thickness, self.thickness):
+        is_same = map_status == self.map_status and are_same(course, self.course)
+        if is_same and are_same(thickness, self.thickness):
             return
         self.thickness, self.map_status, self.course = thickness, map_status, course
         if self.straight is not None:
             self.straight.thickness, self.straight.course = thickness, course
         self.is_written = self.has_moved_only = False
+
+    @property
+    def wetness(self) -> np.ndarray | None:
+        """(S,) float32 wetness of strands for the shading; None if they do not differ."""
+        return self.styles.wetness if self.mapped_wetness is None else self.mapped_wetness
+
+    def soak(self, wetness: np.ndarray | None) -> None:
+        """Give strands the wetness (S,) float32 of a map and of styles; None without a map."""
+        if not are_same(wetness, self.mapped_wetness):
+            self.mapped_wetness = wetness
+            self.is_written = self.has_moved_only = False
 
     @property
     def shown(self) -> "BoundHair":
@@ -226,8 +238,8 @@ class BoundHair:
         self.shares[moved] = shares
 
 
-def is_same_thickness(one: np.ndarray | None, other: np.ndarray | None) -> bool:
-    """Whether factors of radii, each possibly None, are the same."""
+def are_same(one: np.ndarray | None, other: np.ndarray | None) -> bool:
+    """Whether numbers of strands, each possibly None, are the same."""
     return one is other if one is None or other is None else np.array_equal(one, other)
 
 

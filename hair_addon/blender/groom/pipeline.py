@@ -34,9 +34,9 @@ from . import (
     read_surfaces,
     reused_roots,
     size_fitting,
-    strand_thickness,
     styled_hair,
     varied_guides,
+    varied_strands,
     writing,
 )
 from .bindings import BoundHair
@@ -111,7 +111,7 @@ def interpolating_hair(
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
     writing.require_count(its_target.find(), len(bound.binding.positions), settings.point_count)
     if target is not None:
-        strand_thickness.apply(its_target.find(), bound)
+        varied_strands.apply(its_target.find(), bound)
     # Last, so that nothing happens between this and writing.
     bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
@@ -123,7 +123,7 @@ def bind_hair(
     """Return the `BoundHair` between guides without writing it. Strands of `target` keep their roots if possible."""
     bound = run_now(_binding_hair(guide_curves, settings, depsgraph, target))
     if target is not None:
-        strand_thickness.apply(target, bound)
+        varied_strands.apply(target, bound)
     bound.grow()
     return bound
 
@@ -374,7 +374,7 @@ def restyle(
         trees = bound.styles.shared_trees()
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
         bound.restyle(styles, is_drawn(bound, styles))
-    strand_thickness.apply(target, bound)
+    varied_strands.apply(target, bound)
     return True
 
 

@@ -9,7 +9,6 @@ from ...core.params import Param
 from ..data.maps import ramps, sources
 from ..data.strands import curves
 from ..settings import map_items
-from . import bindings
 from .bindings import BoundHair
 
 SETTING = "strands.thickness"
@@ -49,16 +48,3 @@ def factors(strands: sources.Strands, item: map_items.VellusMap) -> np.ndarray:
     """Return (S,) float32 factors of the radii of strands by a map. Raises `HairError` if its source is missing."""
     settings, ramp = map_items.settings_of(item), ramps.map_samples(item, False)
     return sources.varied_numbers(strands, settings, item.image, 1.0, _FACTOR, ramp).astype(np.float32)
-
-
-def apply(hair: Curves, bound: BoundHair) -> None:
-    """Give bound hair the thickness that the map and the ramp of its Curves have now."""
-    bound.thicken(*read(hair, bound), ramps.samples(hair.vellus.thickness_ramp))
-
-
-def is_same(hair: Curves, bound: BoundHair) -> bool:
-    """Whether bound hair has the thickness that the map and the ramp of its Curves have now."""
-    thickness, map_status = read(hair, bound)
-    if map_status != bound.map_status or not bindings.is_same_thickness(thickness, bound.thickness):
-        return False
-    return bindings.is_same_thickness(ramps.samples(hair.vellus.thickness_ramp), bound.course)

@@ -118,7 +118,7 @@ def write_hair(target: Curves) -> None:
             normals=normals,
         )
         curves.write_clumps(target, bound.styles.clumps)
-        if curves.write_wetness(target, bound.styles.wetness) or strand_maps.has_looks(state):
+        if curves.write_wetness(target, bound.wetness) or strand_maps.has_looks(state):
             looks.evaluate_shading(target)
     if not bound.is_map_written and not attributes.is_from_library(target):
         curves.write_guide_map(target, bound.guide_map if _is_map_wanted(target, bound.settings) else None)

@@ -16,11 +16,12 @@ from ..groom import (
     bindings,
     changed_weights,
     hair_outside,
+    mapped_wetness,
     pipeline,
     size_fitting,
     staleness,
-    strand_thickness,
     styled_hair,
+    varied_strands,
     writing,
 )
 from ..groom.foreign import kept_following, kept_thickness
@@ -161,11 +162,13 @@ def regenerate(hair, depsgraph):
 
 
 def _follow_kept(hair, depsgraph):
-    """Let kept hair follow its guides and the map of its thickness; returns whether either has changed it."""
+    """Let kept hair follow its guides and the maps of its thickness and wetness; returns whether any has changed it."""
     has_moved = follow(hair, depsgraph)
     if has_moved and hair.vellus.status:  # it cannot follow
         return True
-    if not kept_thickness.follow(hair):
+    is_thickened = kept_thickness.follow(hair)
+    is_soaked = mapped_wetness.follow_kept(hair, hair.vellus.status if is_thickened else "")
+    if not (is_thickened or is_soaked):
         return has_moved
     events.strands_computed(hair)
     return True
@@ -176,7 +179,7 @@ def _is_reweighed(hair, depsgraph):
     bound = None if hair_outside.is_wanted(hair) else changed_weights.rebound(hair, depsgraph)
     if bound is None:
         return False
-    strand_thickness.apply(hair, bound)
+    varied_strands.apply(hair, bound)
     bindings.keep(hair, bound)
     hair_cache.follow_where_drawn(hair.session_uid, bound)
     write_soon(hair)
@@ -247,7 +250,7 @@ def is_ahead(hair):
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
     return (
-        strand_thickness.is_same(hair, bound)
+        varied_strands.is_same(hair, bound)
         and bound.styles.read.styles == styles
         and bound.styles.read.has_maps(*styled_hair.read_maps(hair, guide_curves.surface, bound.surface, styles))
     )

@@ -121,7 +121,7 @@ class StrandGenerator:
         if not bound.has_moved_only and not attributes.are_radii(cached.radii.ravel(), radii):
             cached.radii = np.broadcast_to(radii, cached.radii.shape)
             cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
-        wetness = bound.styles.wetness
+        wetness = bound.wetness
         if not are_equal(cached.wetness, wetness):
             cached.wetness = wetness
             texture = None if wetness is None else strand_textures.numbers_texture(wetness, cached.on_gpu.row_strands)

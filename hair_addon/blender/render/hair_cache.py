@@ -326,7 +326,7 @@ def _read(datablock, bound, shown):
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
         looks = strand_maps.read_looks(datablock)
     else:
-        (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
+        (_identities, randoms), wetness = bound.binding.identities, bound.wetness
         looks = _unwritten_looks(datablock, bound)
     # Roots are taken from the binding too: the datablock may store the roots of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)

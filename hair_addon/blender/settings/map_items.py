@@ -96,7 +96,7 @@ def is_set(item: VellusMap) -> bool:
 def read_faces(state) -> bool:
     """Return whether maps vary the strands of a hair by values on faces of the surface."""
     return any(
-        item.setting.startswith(("strands.", "styles."))
+        item.setting.startswith(("strands.", "styles.", "look.wetness"))
         and item.kind in {"IMAGE", "GROUP", "ATTRIBUTE"}
         and is_set(item)
         for item in state.maps

@@ -3,6 +3,8 @@
 
 import bpy
 
+_STORED_LOOK = "look.wetness"  # by maps, a number of each strand, as by the style Wet
+
 
 def mark_geometry(group, _context):
     """Mark guides or strands for regeneration; an `update` of properties."""
@@ -22,6 +24,8 @@ def mark_map(item, context):
         mark_dynamics(item, context)
     elif item.setting.startswith("look."):
         mark_shading(item, context)
+        if item.setting == _STORED_LOOK:
+            mark_geometry(item, context)
     elif item.setting:
         mark_geometry(item, context)
 
@@ -31,7 +35,7 @@ def mark_changed_map(item):
     state = item.id_data.vellus
     if item.setting.startswith("dynamics."):
         state.is_dynamics_stale = True
-    elif item.setting.startswith("look."):
+    elif item.setting.startswith("look.") and item.setting != _STORED_LOOK:
         state.is_shading_stale = True
     elif item.setting:
         state.is_stale = True
@@ -54,6 +58,13 @@ def mark_water(group, context):
     guides = group.id_data.vellus.guide_curves
     if guides is not None and guides.vellus.simulates and guides.is_editable:
         mark_dynamics(guides.vellus, context)
+
+
+def mark_wetness(group, context):
+    """Like `mark_water`, and write the wetness of strands that a map varies; group: look of the hair."""
+    if any(item.setting == _STORED_LOOK for item in group.id_data.vellus.maps):
+        mark_geometry(group, context)
+    mark_water(group, context)
 
 
 def mark_wet_style(group, context):

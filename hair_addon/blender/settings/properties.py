@@ -23,8 +23,8 @@ from .marks import (
     mark_geometry,
     mark_shading,
     mark_shown,
-    mark_water,
     mark_water_of_guides,
+    mark_wetness,
 )
 from .translations import CONTEXT
 
@@ -121,7 +121,7 @@ class VellusAppearance(bpy.types.PropertyGroup):
 
     __annotations__ = {
         **setting_properties.annotations(Appearance, mark_shading),
-        **setting_properties.annotations(Appearance, mark_water, skip=_all_but_wetness(Appearance)),
+        **setting_properties.annotations(Appearance, mark_wetness, skip=_all_but_wetness(Appearance)),
     }
 
 

@@ -10,15 +10,29 @@ import bpy
 from ...core.styling.base import has_effect
 from ...core.styling.program import mask_key
 from ...core.styling.strand_wetness import mean_amount
-from . import setting_properties, style_items, style_keys
+from . import map_items, setting_properties, style_items, style_keys
+
+SETTING = "look.wetness"
 
 
 def of_hair(state):
-    """Return (least, most) wetness of a hair, without and with its Wet styles; state: its `VellusCurves`."""
+    """Return (least, most) wetness of a hair, without and with its Wet styles and the map of its look.
+
+    state: its `VellusCurves`.
+    """
     guides = state.guide_curves
     of_dynamics = 0.0 if guides is None else _value(guides.vellus.dynamics)
-    least = max(_value(state.appearance), of_dynamics)
-    return least, max(least, setting_properties.shortest(style_items.wetness_of(state)))
+    own = _value(state.appearance)
+    item = map_of(state)
+    least = of_dynamics if item is not None else max(own, of_dynamics)
+    most = own if item is None else min(own * max(item.low, item.high, 1.0), 1.0)
+    return least, max(least, most, setting_properties.shortest(style_items.wetness_of(state)))
+
+
+def map_of(state):
+    """Return the map of the look's wetness, which varies between strands; None without a source."""
+    item = map_items.item_of(state, SETTING)
+    return item if item is not None and map_items.is_set(item) else None
 
 
 def of_guides(state):

@@ -102,7 +102,12 @@ class Appearance(Settings):
     ior: float = param_of(marschner.Settings, "eta")
     cuticle_angle: float = param_of(marschner.Settings, "tilt", math.radians(2.0))
     wetness: float = param(
-        0.0, "Amount of water: strands gleam, and the hair darkens", low=0.0, high=1.0, subtype="FACTOR"
+        0.0,
+        "Amount of water: strands gleam, and the hair darkens",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        may_vary=True,
     )
     random_color: float = param(
         0.0, "Random variation of the pigment between strands", low=0.0, high=1.0, subtype="FACTOR", may_vary=True

@@ -9,7 +9,7 @@ import numpy as np
 from ....core.errors import HairError
 from ....core.maps import varied_settings
 from ....core.shading.strand_looks import StrandLooks, strand_looks
-from ...settings import map_items, properties
+from ...settings import map_items, properties, shared_wetness
 from ..strands import attributes
 from . import ramps, sources
 
@@ -21,6 +21,7 @@ def has_looks(state) -> bool:
     """Whether maps vary the look of a hair."""
     return any(
         item.setting.startswith("look.")
+        and item.setting != shared_wetness.SETTING
         and map_items.is_set(item)
         and varied_settings.is_used(item.setting, state.appearance.parametrization)
         for item in state.maps
@@ -42,7 +43,7 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
         section, _, name = item.setting.partition(".")
         if section != "look" or item.setting not in varied_settings.all_varied() or not map_items.is_set(item):
             continue
-        if not varied_settings.is_used(item.setting, look.parametrization):
+        if item.setting == shared_wetness.SETTING or not varied_settings.is_used(item.setting, look.parametrization):
             continue
         try:
             varied[name] = _varied(strands, item, getattr(look, name))

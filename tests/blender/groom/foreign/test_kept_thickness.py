@@ -126,3 +126,18 @@ def test_undo_takes_a_map_back(kept):
     update()
     hair = next(datablock for datablock in bpy.data.hair_curves if datablock.vellus.kind == "HAIR")
     np.testing.assert_array_equal(curves.read_radii(hair), np.float32(0.5) * before)
+
+
+def test_kept_hair_has_the_wetness_of_its_map(kept):
+    """Each strand has the wetness of the look times the factor at its root, beside a map of its thickness."""
+    kept.data.vellus.appearance.wetness = 0.5
+    api.set_map(kept, "strands.thickness", "curves:lost")
+    api.set_map(kept, "look.wetness", "curves:tone")
+    update()
+    np.testing.assert_allclose(curves.read_wetness(kept.data), 0.5 * masks(kept, "CURVES", "tone"), rtol=1e-6)
+    assert "lost" in kept.data.vellus.status and not kept.data.vellus.is_stale
+    api.clear_map(kept, "strands.thickness")
+    kept.data.vellus.appearance.wetness = 1.0
+    update()
+    np.testing.assert_allclose(curves.read_wetness(kept.data), masks(kept, "CURVES", "tone"), rtol=1e-6)
+    assert kept.data.vellus.status == ""
