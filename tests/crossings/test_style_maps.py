@@ -333,6 +333,9 @@ def test_linked_hair_shows_its_maps(curls, tmp_path):
     update()
     hair = here.objects[2]
     bpy.context.scene.frame_set(5)
+    sphere = here.objects[0]
+    sphere.vertex_groups["half"].add(range(len(sphere.data.vertices)), 0.5, "REPLACE")  # which the shot does not keep
+    sphere.data.update_tag()
     hair.data.update_tag()
     update()
     for found, known in zip(values(hair), wanted, strict=True):
@@ -342,6 +345,7 @@ def test_linked_hair_shows_its_maps(curls, tmp_path):
     layout, item = Layout(), map_items.item_of(hair.data.vellus, RADIUS)
     map_rows.draw(layout, item, hair.data)
     assert "is linked from another file" in " ".join(layout.texts)
+    assert "Strands keep the map's values of that file" in layout.texts
     for setting, change in (("styles.Curl.pitch", bpy.ops.vellus.edit_map), (RADIUS, bpy.ops.vellus.remove_map)):
         with pytest.raises(RuntimeError, match="linked from another file"):
             change(setting=setting)

@@ -31,6 +31,8 @@ def draw(layout, item, hair):
     except HairError as error:
         for line in textwrap.wrap(error_text(error), _CHARACTERS):
             layout.label(text=line, translate=False)
+        if hair.library is not None:
+            layout.label(text="Strands keep the map's values of that file")
         layout = layout.column()
         layout.enabled = False
     layout.use_property_split = True
