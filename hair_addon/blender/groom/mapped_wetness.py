@@ -19,17 +19,18 @@ def read(hair: Curves, bound: BoundHair) -> tuple[np.ndarray | None, str]:
     """Return (wetness (S,) float32 of bound hair by its map and its styles, a sentence about a missing source of the
     map); None without a map.
     """
-    if shared_wetness.map_of(hair.vellus) is None:
+    item = shared_wetness.map_of(hair.vellus)
+    if item is None:
         return None, ""
-    found, status = _of_strands(hair, strand_thickness.strands_of(hair, bound))
+    found, status = _of_strands(hair, item, strand_thickness.strands_of(hair, bound))
     of_styles = bound.styles.wetness
     soaked = np.float32(program.wetness(bound.styles.read.styles)) if of_styles is None else of_styles
     return np.maximum(found, soaked), status
 
 
-def _of_strands(hair, strands):
+def _of_strands(hair, item, strands):
     """Return (wetness (S,) float32 of strands by the map of a hair's look, a sentence about a missing source)."""
-    item, value = shared_wetness.map_of(hair.vellus), properties.own_look_of(hair.vellus).wetness
+    value = properties.own_look_of(hair.vellus).wetness
     details = varied_settings.all_varied()[shared_wetness.SETTING][1]
     settings, ramp = map_items.settings_of(item), ramps.map_samples(item, False)
     try:
@@ -43,9 +44,10 @@ def follow_kept(hair: Curves, status: str) -> bool:
 
     status: of the hair by other maps; without any, a sentence about a missing source becomes the status of the hair.
     """
-    if shared_wetness.map_of(hair.vellus) is None or attributes.is_from_library(hair) or not len(hair.curves):
+    item = shared_wetness.map_of(hair.vellus)
+    if item is None or attributes.is_from_library(hair) or not len(hair.curves):
         return False
-    wetness, of_map = _of_strands(hair, sources.stored_strands(hair))
+    wetness, of_map = _of_strands(hair, item, sources.stored_strands(hair))
     if curves.write_wetness(hair, wetness):
         looks.evaluate_shading(hair)
     hair.vellus.status, hair.vellus.is_stale = status or of_map, False
