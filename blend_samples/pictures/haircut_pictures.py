@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/manual/haircuts.jpg: haircuts that are made in Blender's window by tests/desktop/haircuts, drawn by Vellus.
+"""docs/manual/haircuts.jpg and haircuts_cycles.jpg: haircuts that tests/desktop/haircuts makes in Blender's window.
 
     python blend_samples/pictures/haircut_pictures.py [NAME …] [--cycles] [--drawn-only]
 
 Each haircut leaves out/haircuts/NAME.blend and NAME.png, of which the sheet is made; --cycles writes NAME_cycles.png
-instead. out/haircuts/facts.json has the number of clicks, fields, views and strokes of each haircut, and times.
+instead, and the sheet that compares them. out/haircuts/facts.json has the number of clicks, fields, views and strokes
+of each haircut, and times.
 """
 
 import argparse
@@ -20,33 +21,37 @@ from mathutils import Vector
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
-from blend_samples.heads import head, portrait
+from blend_samples.heads import cat, head, portrait
 from blend_samples.sheets import picture_files
 from tests.desktop.haircuts.haircuts import HAIRCUTS
+from tests.desktop.haircuts.hands import STRANDS
 from tools import build_extension, compile_kernels, desktop_blender
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out" / "haircuts"
-BARE = OUT / "bare.blend"
-SHEET = ROOT / "docs" / "manual" / "haircuts.jpg"
+BARE, BARE_CAT = OUT / "bare.blend", OUT / "bare_cat.blend"
+SHEET, COMPARED = (ROOT / "docs" / "manual" / f"{name}.jpg" for name in ("haircuts", "haircuts_cycles"))
 WIDTH, HEIGHT = 250, 290  # pixels of a picture
-COLUMNS = 4
+COLUMNS = 3
 WINDOW_SIZE = (560, 440)
-SHOWN, STRANDS = 300, 40_000  # strands in the window, which software drivers draw slowly, and in the picture
+SHOWN = 300  # strands in the window, which software drivers draw slowly
 CYCLES_SAMPLES = 48
+COMPARISON = (("", "Vellus"), ("_cycles", "Cycles"))  # endings of names, and labels
 
 # Place of the camera [m] of each haircut.
 _QUARTER, _BEHIND, _LEFT_BEHIND = (0.75, -1.15, 0.80), (0.60, 1.20, 0.86), (1.20, 0.75, 0.86)
 CAMERAS = {
     "wavy": _QUARTER,
     "bob": (-0.65, -1.2, 0.80),
+    "fade": (0.95, -0.85, 0.80),
     "bun": _LEFT_BEHIND,
     "ponytail": _LEFT_BEHIND,
     "braids": (0.35, -1.30, 0.82),
     "cornrows": (0.75, -0.95, 1.15),
     "beard": (0.60, -1.25, 0.72),
+    "cat": (0.75, -0.95, 0.42),
 }
-_FACE = Vector((0.0, -0.02, 0.69))  # [m] what the camera looks at
+_FACE, _CAT = Vector((0.0, -0.02, 0.69)), Vector((0.01, 0.03, 0.165))  # [m] what the camera looks at
 
 
 def main(arguments):
@@ -60,23 +65,29 @@ def main(arguments):
     gpu.init()
     names = given.names or list(HAIRCUTS)
     if not given.drawn_only:
-        save_head()
+        save_bare()
         for name in names:
             cut(name)
     for name in names:
         draw(name, given.cycles)
-    if not given.cycles:
-        write_sheet([name for name in HAIRCUTS if (OUT / f"{name}.png").exists()])
+    if given.cycles:
+        write_sheet(COMPARED, [(f"{name}{end}", label) for name in names for end, label in COMPARISON], 4)
+    else:
+        write_sheet(SHEET, [(name, name.title()) for name in HAIRCUTS if (OUT / f"{name}.png").exists()])
 
 
-def save_head():
-    """Write the head without hair, with camera and lights, as an artist finds it."""
+def save_bare():
+    """Write the head and the cat without hair, with camera and lights, as an artist finds them."""
     OUT.mkdir(parents=True, exist_ok=True)
     skull = head.build()
     portrait.dress(skull, portrait.AHEAD)
     head.light()
     bpy.context.view_layer.objects.active = skull
     bpy.ops.wm.save_as_mainfile(filepath=str(BARE))
+    animal = cat.build()
+    head.light()
+    bpy.context.view_layer.objects.active = animal
+    bpy.ops.wm.save_as_mainfile(filepath=str(BARE_CAT))
 
 
 def cut(name):
@@ -85,7 +96,7 @@ def cut(name):
     profile, log = OUT / "profile", OUT / f"{name}.log"
     profile.mkdir(parents=True, exist_ok=True)
     script = ROOT / "tests" / "desktop" / "haircuts" / "in_window.py"
-    words = [name, extension, OUT, BARE, SHOWN, STRANDS]
+    words = [name, extension, OUT, BARE_CAT if name == "cat" else BARE, SHOWN, STRANDS]
     blender = desktop_blender.find_or_install()
     status = blender.run(script, words, profile=profile, log=log, limit=900, size=WINDOW_SIZE)
     if status:
@@ -95,7 +106,7 @@ def cut(name):
 def draw(name, by_cycles=False):
     """Write the picture of a haircut to OUT."""
     bpy.ops.wm.open_mainfile(filepath=str(OUT / f"{name}.blend"))
-    light(CAMERAS[name], _FACE)
+    light(CAMERAS[name], _CAT if name == "cat" else _FACE)
     if by_cycles:
         scene = bpy.context.scene
         scene.render.engine, scene.cycles.samples = "CYCLES", CYCLES_SAMPLES
@@ -127,16 +138,16 @@ def light(place, middle):
     bpy.context.view_layer.update()
 
 
-def write_sheet(names):
-    """Write the sheet of the manual from the pictures in OUT, with the names of the haircuts."""
-    pictures = [picture_files.below_caption(picture_files.read(OUT / f"{name}.png")) for name in names]
-    height = len(pictures[0])
-    pictures += [np.full_like(pictures[0], picture_files.BACKGROUND)] * (-len(pictures) % COLUMNS)
+def write_sheet(path, pictures, columns=COLUMNS):
+    """Write a sheet of the manual from pictures in OUT [(name, label)]."""
+    read = [picture_files.below_caption(picture_files.read(OUT / f"{name}.png")) for name, _label in pictures]
+    height = len(read[0])
+    read += [np.full_like(read[0], picture_files.BACKGROUND)] * (-len(read) % columns)
     words = [
-        (name.title(), WIDTH * (place % COLUMNS) + 8, height * (place // COLUMNS) + picture_files.BASELINE)
-        for place, name in enumerate(names)
+        (label, WIDTH * (place % columns) + 8, height * (place // columns) + picture_files.BASELINE)
+        for place, (_name, label) in enumerate(pictures)
     ]
-    picture_files.write(picture_files.rows(pictures, COLUMNS), SHEET, words)
+    picture_files.write(picture_files.rows(read, columns), path, words)
 
 
 if __name__ == "__main__":

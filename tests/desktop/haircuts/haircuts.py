@@ -16,11 +16,13 @@ from tests.desktop.haircuts.hands import (
     mirrored,
     press,
     select,
+    style,
+    vary,
     view,
     weights,
 )
 
-BACK, ABOVE = (0, 1, 0.15), (0, -0.25, 1)
+LEFT, RIGHT, BACK, ABOVE = (1, 0, 0.1), (-1, 0, 0.1), (0, 1, 0.15), (0, -0.25, 1)
 SIDE, FRONT = (1, 0, 0), (0, -1, 0.55)
 
 PARTING = ((0.030, -0.140, 0.80), (0.030, -0.10, 0.84), (0.028, -0.06, 0.853), (0.02, -0.02, 0.85))
@@ -75,7 +77,7 @@ WAVY = (
     lines("vellus.draw_flow", *AWAY_FROM_PARTING),
     fields("guides", drape=True),
     *OFF_THE_FACE,
-    press("vellus.apply_style_preset", preset="WAVY"),
+    style("WAVY"),
     press("vellus.apply_preset", preset="BROWN"),
 )
 
@@ -100,8 +102,54 @@ BOB = (
     select("Plane"),
     press("object.delete", confirm=False),
     select("Hair"),
-    press("vellus.apply_style_preset", preset="SLEEK"),
+    style("SLEEK"),
     press("vellus.apply_preset", preset="DARK_BROWN"),
+)
+
+# Weights of lengths from the top to the skin, and the heights [m] of their strokes around the head.
+FADED = ((0.5, (0.806,)), (0.25, (0.786,)), (0.12, (0.768,)), (0.05, (0.748, 0.722, 0.696, 0.670, 0.645)))
+SIDE_LEVELS = ((0.066, -0.120), (0.080, -0.07), (0.085, -0.02), (0.072, 0.03), (0.02, 0.06))  # (x, y) of a stroke [m]
+CORNER_LEVELS = ((0.085, -0.03), (0.080, 0.01), (0.062, 0.04), (0.03, 0.06))
+BACK_LEVELS = ((-0.075, 0.02), (-0.04, 0.05), (0.0, 0.06), (0.04, 0.05), (0.075, 0.02))
+
+
+def faded(direction, places):
+    """Paint bands of weights that are seen from a direction, each over the lower edge of the band above."""
+    strokes = [
+        weights(weight, 0.026, [(*place, z) for row, z in enumerate(heights) for place in places[:: 1 - 2 * (row % 2)]])
+        for weight, heights in FADED
+    ]
+    return (view(*direction), *strokes)
+
+
+FADE = (
+    *grown(0.035, drape=False, gravity=0.2),
+    view(*FRONT),
+    lines(
+        "vellus.draw_flow",
+        ((0.0, 0.03, 0.83), (0.0, -0.05, 0.853), (0.0, -0.13, 0.815)),
+        *both_sides(((0.04, 0.02, 0.825), (0.04, -0.05, 0.843), (0.03, -0.13, 0.81))),
+        *both_sides(((0.075, -0.08, 0.78), (0.083, -0.06, 0.75), (0.082, -0.055, 0.72))),
+    ),
+    view(*BACK),
+    lines(
+        "vellus.draw_flow",
+        ((0.0, 0.05, 0.81), (0.0, 0.065, 0.76), (0.0, 0.055, 0.70)),
+        *both_sides(((0.055, 0.03, 0.80), (0.065, 0.035, 0.75), (0.06, 0.03, 0.70))),
+    ),
+    vary("strands.strand_length", kind="GROUP"),
+    press("vellus.paint_map", setting="strands.strand_length"),
+    mirrored(),
+    *faded(LEFT, SIDE_LEVELS),
+    *faded((0.7, 0.7, 0.1), CORNER_LEVELS),
+    *faded(BACK, BACK_LEVELS),
+    press("object.mode_set", mode="OBJECT"),
+    select("Hair"),
+    fields("hair", radius=5.0e-5),
+    style("PIXIE"),
+    fields("Lean", amount=0.1),
+    fields("Clump", amount=0.2),
+    press("vellus.apply_preset", preset="BLACK"),
 )
 
 TAIL = ((0.0, 0.040, 0.795), (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.090, 0.74), (0.0, 0.085, 0.60))
@@ -116,7 +164,7 @@ PONYTAIL = (
 )
 
 BUN = (
-    *grown(0.36, drape=False, length_variation=0.0, guide_count=700),
+    *grown(0.36, drape=False),
     view(*SIDE),
     curve("Tie", ((0.0, 0.035, 0.805), (0.0, 0.065, 0.83)), depth="CURSOR"),
     select("Head"),
@@ -187,16 +235,68 @@ BEARD = (
     press("paint.weight_paint_toggle"),
     *grown(0.022, mask="Group", gravity=0.6),
     fields("hair", radius=3.0e-5),
-    press("vellus.apply_style_preset", preset="BEARD"),
+    style("BEARD"),
     press("vellus.apply_preset", preset="DARK_BROWN"),
+)
+
+_SEEN = {"middle": (0.0, 0.03, 0.18), "distance": 0.75}
+
+_SIDE = (
+    (
+        *((0.02, -0.10, 0.325), (0.03, -0.06, 0.35), (0.03, -0.02, 0.31), (0.035, 0.02, 0.24)),
+        *((0.05, 0.07, 0.20), (0.06, 0.13, 0.13), (0.05, 0.165, 0.07)),
+    ),
+    ((0.04, -0.10, 0.285), (0.055, -0.06, 0.270), (0.05, -0.03, 0.245)),
+    ((0.04, -0.05, 0.24), (0.045, -0.055, 0.18), (0.04, -0.055, 0.12), (0.035, -0.06, 0.04)),
+    ((0.05, -0.01, 0.20), (0.06, 0.03, 0.14), (0.08, 0.05, 0.08), (0.10, 0.05, 0.025)),
+)
+
+CAT = (
+    select("Head"),
+    press("vellus.add_hair", density_group="fur", guide_count=1200),
+    fields("guides", length=0.07, gravity=0.0, lift=0.6),
+    view(*LEFT, **_SEEN),
+    lines("vellus.draw_flow", *_SIDE),
+    view(*RIGHT, **_SEEN),
+    lines("vellus.draw_flow", *[[(-x, y, z) for x, y, z in stroke] for stroke in _SIDE]),
+    view(0.0, -1.0, 0.1, **_SEEN),
+    lines(
+        "vellus.draw_flow",
+        ((0.0, -0.10, 0.315), (0.0, -0.09, 0.345)),
+        ((0.0, -0.07, 0.25), (0.0, -0.065, 0.20), (0.0, -0.05, 0.15)),
+    ),
+    view(0.2, 0.2, 1.0, **_SEEN),
+    lines("vellus.draw_flow", ((0.05, 0.185, 0.05), (0.10, 0.19, 0.045), (0.14, 0.16, 0.045), (0.15, 0.05, 0.04))),
+    vary("strands.strand_length", kind="GROUP"),
+    press("vellus.paint_map", setting="strands.strand_length"),
+    mirrored(),
+    view(0.0, -1.0, 0.1, **_SEEN),
+    weights(
+        0.15,
+        0.020,
+        ((0.0, -0.11, 0.285), (0.0, -0.10, 0.315), (0.0, -0.08, 0.345)),
+        ((0.0, -0.10, 0.27), (0.03, -0.10, 0.285), (0.03, -0.09, 0.32), (0.038, -0.04, 0.35)),
+        ((0.034, -0.05, 0.10), (0.034, -0.07, 0.015)),
+    ),
+    view(*LEFT, **_SEEN),
+    weights(
+        0.2, 0.016, ((0.036, -0.05, 0.10), (0.036, -0.06, 0.05), (0.036, -0.08, 0.015)), ((0.08, -0.03, 0.018),) * 2
+    ),
+    press("object.mode_set", mode="OBJECT"),
+    select("Hair"),
+    style("FUR_LONG"),
+    fields("hair", radius=1.2e-4),
+    press("vellus.apply_preset", preset="GINGER"),
 )
 
 HAIRCUTS = {
     "wavy": WAVY,
     "bob": BOB,
+    "fade": FADE,
     "bun": BUN,
     "ponytail": PONYTAIL,
     "braids": BRAIDS,
     "cornrows": CORNROWS,
     "beard": BEARD,
+    "cat": CAT,
 }

@@ -16,6 +16,7 @@ from mathutils import Vector
 from tests.desktop import window
 
 ACTION_SECONDS = 2.0  # an artist's time for one click, field, view or stroke: an estimate
+STRANDS = 40_000  # of a picture; the window shows fewer
 _EVENTS_PER_METER = 80.0
 _COMB = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
 _TIMEOUT = 90.0  # [s] for the hair to follow
@@ -68,7 +69,8 @@ def _owners():
         return {}
     own = {"hair": hair().data.vellus.hair, "look": hair().data.vellus.appearance}
     own |= {item.name: getattr(item, item.kind.lower()) for item in hair().data.vellus.styles}
-    return own | {"guides": guides().data.vellus.guides, "guide panel": guides().data.vellus}
+    maps = {item.setting: item for item in hair().data.vellus.maps}
+    return own | maps | {"guides": guides().data.vellus.guides, "guide panel": guides().data.vellus}
 
 
 def select(name):
@@ -118,6 +120,19 @@ def view(x, y, z, distance=0.62, middle=(0.0, -0.03, 0.72)):
         seen.view_location, seen.view_distance, seen.view_perspective = middle, distance, "PERSP"
         seen.view_rotation = Vector((x, y, z)).to_track_quat("Z", "Y")
         yield from window.wait(0.3)
+
+    return act
+
+
+def style(preset):
+    """Choose a style preset with as many strands as the picture has: presets fit locks to the spacing of strands."""
+
+    def act():
+        shown, hair().data.vellus.hair.strand_count = hair().data.vellus.hair.strand_count, STRANDS
+        yield from settled()
+        yield from press("vellus.apply_style_preset", preset=preset)()
+        hair().data.vellus.hair.strand_count = shown
+        yield from settled()
 
     return act
 
@@ -184,6 +199,17 @@ def cursor(x, y, z):
     return act
 
 
+def vary(setting, **values):
+    """Press the small button beside a setting, and type into the fields of its map."""
+
+    def act():
+        yield from press("vellus.edit_map", setting=setting)()
+        count.fields -= 1  # the button knows its setting
+        yield from fields(setting, **values)()
+
+    return act
+
+
 def comb(brush, size, *strokes, strength=1.0):
     """Press Comb Guides, pick a brush of a size [m], draw strokes, and stop combing."""
 
@@ -213,7 +239,7 @@ def weights(weight, size, *strokes):
         paint.unified_paint_settings.weight = paint.brush.weight = weight
         paint.unified_paint_settings.size = paint.brush.size = max(2, int(2.0 * _pixels(size)))
         for places in strokes:
-            yield from _stroke(places)
+            yield from _stroke(places, 0.5 * _EVENTS_PER_METER)  # Blender fills the gaps of a stroke
         yield from settled()
 
     return act
@@ -245,13 +271,13 @@ def _pixels(size):
     return float(np.linalg.norm(ends[1] - ends[0]))
 
 
-def _stroke(places):
+def _stroke(places, events_per_meter=_EVENTS_PER_METER):
     """Press the left mouse button at the first of places [m], pass the others, and release it at the last."""
     count.strokes += 1
     places = np.asarray(places, float)
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
-    steps = max(6, int(_EVENTS_PER_METER * along[-1]))
+    steps = max(6, int(events_per_meter * along[-1]))
     fine = np.stack([np.interp(np.linspace(0.0, along[-1], steps + 1), along, axis) for axis in places.T], axis=1)
     pixels = window.places(fine).astype(int)
     event = window.window().event_simulate
