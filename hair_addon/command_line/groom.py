@@ -78,6 +78,7 @@ def run(given, console):
     else:
         systems = [_grow(surface, settings, console)]
     guides, hair = systems[0]
+    _warn_of_styles(given, hair, console)
     seconds = time.perf_counter() - started
     console.progress("Writing", 1.0)
     blender.io.groom_files.write(given.out, guides, hair, file_axes)
@@ -231,6 +232,13 @@ def _warn_of_useless(names, reason, console):
     if names:
         has = "has" if len(names) == 1 else "have"
         console.warn(f"{reason}: {', '.join(names)} {has} no effect.")
+
+
+def _warn_of_styles(given, hair, console):
+    """Warn of maps and curves of styles that hair Curves do not have."""
+    names = ", ".join(blender.settings.style_items.names_of(hair.vellus))
+    reason = f"The hair has only the styles {names}" if names else "The hair has no styles"
+    _warn_of_useless(map_options.without_effect(given, hair), reason, console)
 
 
 @contextlib.contextmanager

@@ -99,6 +99,18 @@ def mapped(given, settings):
     return replace(settings, maps=tuple(maps.values()), thickness_curve=curve)
 
 
+def without_effect(given, hair):
+    """Return the settings of styles in options that hair Curves do not have."""
+    items = blender.settings.style_items
+    styles = dict(zip(items.names_of(hair.vellus), items.styles_of(hair.vellus), strict=True))
+    found = []
+    for setting in dict.fromkeys([*(one.setting for one in given.maps), *(setting for setting, _ in given.courses)]):
+        name, of_style = varied_settings.style_of(setting)
+        if name and (name not in styles or varied_settings.details_of_style(styles[name], of_style) is None):
+            found.append(setting)
+    return found
+
+
 def _loaded(one):
     if one.kind != "IMAGE" or not Path(one.source).is_file():
         return one

@@ -108,7 +108,11 @@ def test_style_presets_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
 
 def test_lengths_that_are_not_given_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
     out = tmp_path / "out.blend"
-    assert run_here("groom", mesh, *SMALL, "--out", out, "--style", "curl:radius=0.01,seed=3").status == 0
+    unknown = ("--course", "styles.Crul.radius=0:1 1:0", "--course", "styles.Curl.angle=0:1 1:0")
+    ended = run_here("groom", mesh, *SMALL, "--out", out, "--style", "curl:radius=0.01,seed=3", *unknown)
+    assert ended.status == 0
+    warning = "The hair has only the styles Curl: styles.Crul.radius, styles.Curl.angle have no effect."
+    assert warning in ended.errors
     settings = grown(out)[0]
     (found,) = settings.styles
     factor = settings.guides.length / 0.12

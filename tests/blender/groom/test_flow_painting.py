@@ -12,6 +12,7 @@ from mathutils import Matrix, Vector
 from hair_addon import api
 from hair_addon.blender.groom.guides import flow_painting
 from hair_addon.blender.ui import brush_circle, tools
+from hair_addon.blender.ui.operators.flow_painting import VELLUS_OT_paint_flow
 from hair_addon.core.errors import HairError
 from tests.support.interface.layout import draw, redo_panel
 from tests.support.reading import evaluated_points, points
@@ -189,6 +190,19 @@ def test_the_circle_is_drawn_where_the_view_shows_it():
     expected = [view3d_utils.location_3d_to_region_2d(region, view, Vector(p)) + Vector((20, 10)) for p in points]
     np.testing.assert_allclose(brush_circle.in_window(points, region, view), expected, rtol=1e-6)
     assert brush_circle.in_window(points * (1.0, 1.0, -1.0), region, view) is None
+
+
+def test_guides_without_a_surface_are_refused(guides):
+    """A press of the mouse and a script get a sentence, and no circle is drawn."""
+    guides.data.surface = None
+    refused = []
+    operator = SimpleNamespace(refuse=lambda error: refused.append(str(error)), _place_of=lambda *_: None)
+    VELLUS_OT_paint_flow.invoke(operator, bpy.context, None)
+    assert refused == ['"Guides" has no surface: attach the guides to a mesh.']
+    with pytest.raises(RuntimeError, match="The surface is missing"):
+        paint(arc())
+    context = SimpleNamespace(region=True, region_data=True, object=guides)
+    assert brush_circle.draw(context, None, (0, 0)) is None
 
 
 def test_the_tool_is_offered_in_its_modes(guides):

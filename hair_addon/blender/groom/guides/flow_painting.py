@@ -3,6 +3,7 @@
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Object
+from mathutils import Vector
 
 from ....core import geometry, grooming
 from ....core.errors import HairError
@@ -111,14 +112,14 @@ def paint(datablock: Curves, stroke: np.ndarray, settings: FlowSettings, depsgra
     return FlowStroke(datablock, settings, depsgraph).extend(stroke)
 
 
-def place_on(surface: Object, origin: np.ndarray, direction: np.ndarray, depsgraph: Depsgraph) -> np.ndarray | None:
+def place_on(surface: Object, origin: Vector, direction: Vector, depsgraph: Depsgraph) -> np.ndarray | None:
     """Return where a ray in world coordinates first hits a posed surface, (3,) in its local coordinates, or None."""
     found = _hit(surface, origin, direction, depsgraph)
     return None if found is None else found[0]
 
 
 def brush_circle(
-    surface: Object, origin: np.ndarray, direction: np.ndarray, radius: float, depsgraph: Depsgraph
+    surface: Object, origin: Vector, direction: Vector, radius: float, depsgraph: Depsgraph
 ) -> np.ndarray | None:
     """Return points (N, 3) of the brush's circle where a ray first hits a posed surface, in world coordinates, or None.
 
