@@ -150,9 +150,9 @@ def linked_wall(name, color, path):
 
 @pytest.mark.farm
 def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
-    """One process bakes objects with several materials and drivers, linked objects, and objects with custom properties;
-    copies are baked once. An object that cannot be baked leaves the others as they are, and removed pictures are baked
-    again.
+    """One process bakes objects with several materials and drivers, linked objects, objects with custom properties, and
+    images with unsaved pixels; copies are baked once. An object that cannot be baked leaves the others as they are, and
+    removed pictures are baked again.
     """
     baked, start = [], surface_bakes._Baking.__init__
     monkeypatch.setattr(
@@ -179,27 +179,40 @@ def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
     attribute = gray.node_tree.nodes.new("ShaderNodeAttribute")
     attribute.attribute_type, attribute.attribute_name = "OBJECT", "dirt"
     gray.node_tree.links.new(attribute.outputs["Fac"], factor)
+    skin, image = plain_color("Skin", (0.0, 0.0, 0.0))[0], bpy.data.images.new("Skin", 4, 4, float_buffer=True)
+    painted = wall(skin)
+    texture = node(skin.node_tree, "ShaderNodeTexImage", coordinates=False)
+    texture.image = image
+    changed = next(one for one in skin.node_tree.nodes if one.type == "HUE_SAT")
+    skin.node_tree.links.new(texture.outputs["Color"], changed.inputs["Color"])
+
+    def paint(color):
+        image.pixels.foreach_set(np.tile(np.array((*color, 1.0), np.float32), 16))
 
     def colors():
         bpy.context.view_layer.update()
         meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
         return {mesh.owner[0]: [color for _count, color in mesh.colors] for mesh in meshes}
 
+    paint((0.1, 0.2, 0.3))
     found = colors()
     np.testing.assert_allclose(found[both.session_uid], [(0.4, 0.05, 0.05), (0.1, 0.2, 0.8)], atol=1e-3)
     np.testing.assert_allclose(found[head.session_uid], [(0.3, 0.6, 0.1)], atol=1e-3)
     np.testing.assert_allclose(found[dirty.session_uid], [(0.2, 0.2, 0.2)], atol=1e-3)
-    assert baked == [4]
+    np.testing.assert_allclose(found[painted.session_uid], [(0.1, 0.2, 0.3)], atol=1e-3)
+    assert baked == [5]
     (sentence,) = surface_bakes.sentences()
     assert full.name in sentence and "UV maps" in sentence
+    paint((0.3, 0.1, 0.2))
     dirty["dirt"] = 1.0
     dirty.update_tag()
     for file in kept_files.folder("surfaces").glob("*.npz"):
         file.unlink()
     again = colors()
     np.testing.assert_allclose(again.pop(dirty.session_uid), [(0.5, 0.5, 0.5)], atol=1e-3)
+    np.testing.assert_allclose(again.pop(painted.session_uid), [(0.3, 0.1, 0.2)], atol=1e-3)
     assert all(np.allclose(again[uid], found[uid]) for uid in again)
-    assert baked == [4, 3]
+    assert baked == [5, 4]
 
 
 def test_files_in_use_are_kept(tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ from ...host.notices import name_of, say
 from ...host.other_process import OtherProcess
 from ...settings.translations import interface_text
 from .. import scene
-from . import kept_files, surface_materials, unread_nodes, world_digest, world_panoramas
+from . import kept_files, surface_materials, unread_nodes, unsaved_images, world_digest, world_panoramas
 from .shader_sockets import nodes_of
 
 _PATIENCE = 600.0  # [s] for all surfaces of a scene
@@ -107,6 +107,8 @@ class _Baking:
             folder = Path(self._folder.name)
             blend, local = folder / "surfaces.blend", {one for one in originals if one.library is None}
             bpy.data.libraries.write(str(blend), local, path_remap="ABSOLUTE", fake_user=True)
+            materials = {slot.material for one in local for slot in one.material_slots if slot.material is not None}
+            unsaved_images.write(folder, [one.node_tree for one in materials if one.node_tree is not None])
             self._process = OtherProcess(["bake_surfaces", str(blend), "--out", str(folder), *words], folder / "errors")
         except (OSError, RuntimeError) as error:
             self._process, self.reasons = None, dict.fromkeys(objects, cause_of(error))

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import bpy
 
+from . import unsaved_images
+
 _DEEPEST = 12  # maximum depth of nested settings
 _LAYOUT = {"rna_type", "name", "label", "is_active_output", "debug_zone_body_lazy_function_graph"}
 
@@ -79,7 +81,8 @@ def _of_value(value, above, depth):
 
 
 def _of_image(image):
-    described = image.source, image.colorspace_settings.name, image.alpha_mode, *image.size
+    unsaved = unsaved_images.digest_of(image)
+    described = image.source, image.colorspace_settings.name, image.alpha_mode, *image.size, unsaved
     if image.packed_file is not None:
         return *described, hashlib.blake2b(image.packed_file.data, digest_size=16).hexdigest()
     if image.source == "GENERATED":

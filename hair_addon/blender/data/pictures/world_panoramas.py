@@ -14,7 +14,7 @@ from ...host.caches import Cache
 from ...host.notices import name_of
 from ...host.other_process import OtherProcess
 from ...settings.translations import interface_text
-from . import kept_files, world_digest
+from . import kept_files, unsaved_images, world_digest
 
 _PATIENCE = 300.0  # [s] for a panorama
 _LOOK = 0.25  # [s] between checks of processes
@@ -36,6 +36,7 @@ class _Rendering:
         words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame)), *options]
         try:
             bpy.data.libraries.write(str(blend), {owner.original}, path_remap="ABSOLUTE", fake_user=True)
+            unsaved_images.write(folder, [owner.original.node_tree])
             self._process = OtherProcess(words, folder / "errors")
         except (OSError, RuntimeError) as error:
             self._process, self.reason = None, cause_of(error)

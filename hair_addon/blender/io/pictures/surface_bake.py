@@ -10,7 +10,7 @@ import numpy as np
 from ....core.errors import HairError, cause_of
 from ....core.geometry.faces import face_atlas
 from ...data import scene as blender_data
-from ...data.pictures import surface_bakes
+from ...data.pictures import surface_bakes, unsaved_images
 from ...data.pictures.shader_sockets import nodes_of
 from ...host import scene_time
 
@@ -49,6 +49,7 @@ def bake(path, sources, frame, for_render, out):
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         objects = _loaded(path, sources)
+        unsaved_images.restore(Path(path).parent)
         scene = bpy.context.scene
         _set_up(scene)
     except (OSError, RuntimeError, TypeError, ValueError) as error:

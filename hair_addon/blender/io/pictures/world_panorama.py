@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import HairError, cause_of
-from ...data.pictures import shader_sockets
+from ...data.pictures import shader_sockets, unsaved_images
 from ...host import scene_time
 
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
@@ -28,6 +28,7 @@ def render(path, frame, out):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         with bpy.data.libraries.load(str(path)) as (found, wanted):
             wanted.worlds = list(found.worlds)
+        unsaved_images.restore(Path(path).parent)
         scene = bpy.context.scene
         (scene.world,) = wanted.worlds
         scene.render.engine = "CYCLES"
