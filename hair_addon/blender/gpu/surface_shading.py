@@ -13,7 +13,7 @@ from . import drawing, windows
 from .programs import scene_programs, surface_programs, uniforms
 
 texture_cache = Cache()  # textures shared by all surfaces
-baked_cache = Cache(capacity=64)  # `BakedPicture` → texture
+baked_cache = Cache(capacity=16)  # `BakedPicture` → texture, of 8 to 32 MB
 
 
 def shade(surface, parts, first_triangle, view, lights, samplers, buffer, picture, has_over):

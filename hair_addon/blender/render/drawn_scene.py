@@ -18,6 +18,7 @@ from ..gpu import (
     strand_batches,
     strand_textures,
     studio_lights,
+    surface_shading,
     surface_textures,
     windows,
 )
@@ -390,6 +391,9 @@ def _upload(meshes, is_shaded, has_paths):
     """
     uploaded, blockers, twins = {False: [], True: []}, [], {}
     surface_textures.surface_cache.make_room(len(meshes))
+    surface_shading.baked_cache.make_room(
+        2 * sum(material.is_baked for mesh in meshes for _n, material in mesh.materials)
+    )
     for mesh in meshes:
         is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh, twins)
         if mesh.is_seen:

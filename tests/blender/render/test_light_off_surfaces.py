@@ -9,6 +9,8 @@ import pytest
 from mathutils import Vector
 
 from hair_addon import api
+from hair_addon.blender.data.pictures import surface_means
+from hair_addon.blender.host import scene_time
 from hair_addon.core.shading import appearance, presets
 from hair_addon.core.shading.fibre.angles import fibre_angles
 from hair_addon.core.shading.tables import lookup_tables
@@ -181,6 +183,17 @@ def test_an_image_reflects_its_mean_color(scene, source):
         image.update()
         expected = 0.5 * color * received(source) * light_from_below(tangent, towards)
         np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
+
+
+def test_images_are_not_read_again_while_the_animation_plays(scene, monkeypatch):
+    """Pixels of a generated image are read at each reading of the scene, except while the animation plays."""
+    image, read = bpy.data.images.new("Skin", 4, 4), []
+    reduced = surface_means._reduced
+    monkeypatch.setattr(surface_means, "_reduced", lambda raw: (read.append(raw), reduced(raw))[1])
+    first = surface_means._picture_of(image)
+    assert surface_means._picture_of(image) is first and len(read) == 2
+    monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
+    assert surface_means._picture_of(image) is first and len(read) == 2
 
 
 def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):

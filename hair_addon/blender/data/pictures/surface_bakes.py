@@ -27,7 +27,7 @@ _PATIENCE = 600.0  # [s] for all surfaces of a scene
 _LOOK = 0.25  # [s] between checks of processes
 
 process_cache = Cache()  # digest → `_Baking`: running, or failed
-bake_cache = Cache(capacity=64)  # path → `Bake`
+bake_cache = Cache(capacity=16)  # path → `Bake`, of 20 to 150 MB
 last_cache = Cache()  # session_uid of an object → path of its last pictures, with any materials
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....core.imaging import texture_means
 from ....core.maps import pixels
+from ...host import scene_time
 from ...host.caches import Cache
 from ..maps import image_pixels
 
@@ -71,7 +72,8 @@ def _picture_of(image):
     """Return (H, W, 4) float32 premultiplied linear colors of an image, reduced to `_SIDE`; None without pixels."""
     if not (all(image.size) and image.channels):
         return None
-    is_painted = image.is_dirty or image.source == "GENERATED"  # Blender may not report changes of these
+    # Blender may not report changes of these. Nobody paints while the animation plays.
+    is_painted = (image.is_dirty or image.source == "GENERATED") and not scene_time.is_shown_moving()
     kinds = image.filepath_raw, image.colorspace_settings.name, image.alpha_mode, tuple(image.size)
     known = picture_cache.get(image.session_uid)
     if known is not None and known[0] == kinds and not is_painted:
