@@ -264,6 +264,33 @@ def test_the_other_process_knows_its_commands():
         assert callable(command_line.parser("vellus").parse_args(words).run)
 
 
+def test_instances_of_geometry_nodes_are_read_in_turn(stage, monkeypatch):
+    """Instances of objects by Geometry Nodes have the pictures of the objects; instances of meshes are not baked."""
+    asked = []
+    monkeypatch.setattr(surface_bakes, "_needs_bake", lambda one, _override: asked.append(one.original.name))
+    rock, target = wall(bricks()), wall(bricks())
+    rock.name, target.name = "Rock", "Target"
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    begin, end, joined = map(tree.nodes.new, ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeJoinGeometry"))
+    sources = [tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("GeometryNodeMeshCube")]
+    sources[0].inputs["Object"].default_value = rock
+    sources[0].inputs["As Instance"].default_value = True
+    for source in sources:
+        on_points = tree.nodes.new("GeometryNodeInstanceOnPoints")
+        tree.links.new(begin.outputs[0], on_points.inputs["Points"])
+        tree.links.new(source.outputs[-1 if source is sources[0] else 0], on_points.inputs["Instance"])
+        tree.links.new(on_points.outputs[0], joined.inputs[0])
+    tree.links.new(joined.outputs[0], end.inputs[0])
+    target.modifiers.new("Scatter", "NODES").node_group = tree
+    bpy.context.view_layer.update()
+    meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
+    points = len(target.data.vertices)
+    assert len(meshes) == 2 * points + 1
+    assert sorted(asked) == ["Rock"] * (points + 1) + ["Target"]
+
+
 def test_pictures_belong_to_nodes_and_meshes(stage):
     """Pictures are kept while an object moves and poses; other nodes, attributes and faces have others."""
     placed = wall(bricks())

@@ -140,7 +140,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             needs_normals = has_normals
             if not isinstance(has_normals, bool):
                 needs_normals = instance.object.original.session_uid in has_normals
-            bake = bakes.get(instance.object.original.session_uid)
+            bake = bakes.get(instance.object.original.session_uid) if _has_own_mesh(instance) else None
             read_as = is_holdout, is_moving, needs_normals, override, has_uvs, bake
             mesh = _read_drawn_mesh(instance.object, matrix, *read_as)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
@@ -154,13 +154,18 @@ def _bakes(depsgraph, viewport, override):
     """Return {session_uid: `Bake`} of the objects that a viewport or a render shows; a render waits for them."""
     if not any(unread_nodes.baked_labels(material) for material in bpy.data.materials):
         return {}  # without reading the instances once more
-    shown = {
-        one.object.original.session_uid: one.object
+    shown = (
+        one.object
         for one in depsgraph.object_instances
-        if one.object.type == "MESH" and one.show_self and _is_surface_seen(one, viewport)
-    }
+        if one.object.type == "MESH" and one.show_self and _has_own_mesh(one) and _is_surface_seen(one, viewport)
+    )
     is_render, frame = viewport is None, scene_time.time_of(depsgraph.scene)
-    return surface_bakes.find(shown.values(), override, frame, for_render=is_render, waits=is_render)
+    return surface_bakes.find(shown, override, frame, for_render=is_render, waits=is_render)
+
+
+def _has_own_mesh(instance):
+    """Whether an instance has the mesh of its object, not a mesh that Geometry Nodes instance, which is not baked."""
+    return not instance.is_instance or instance.object.original != instance.parent.original
 
 
 def split_clear(meshes):

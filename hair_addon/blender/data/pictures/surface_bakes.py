@@ -91,21 +91,20 @@ class Bake:
 
 
 class _Baking:
-    """A process that bakes objects: {path of the pictures: evaluated object}.
+    """A process that bakes objects: {path of the pictures: original object}.
 
     reasons: {path: why the object cannot be baked}.
     """
 
     def __init__(self, objects, frame, for_render):
         self.reasons, self._names = {}, {path: name_of(one) for path, one in objects.items()}
-        originals = [one.original for one in objects.values()]
-        sources = [(_library_of(one), one.name) for one in originals]
+        sources = [(_library_of(one), one.name) for one in objects.values()]
         words = ["--sources", json.dumps(sources), "--frame", repr(frame), *(["--for-render"] if for_render else [])]
         try:
             parent = next(iter(objects)).parent
             self._folder = tempfile.TemporaryDirectory(prefix=".", dir=parent, ignore_cleanup_errors=True)
             folder = Path(self._folder.name)
-            blend, local = folder / "surfaces.blend", {one for one in originals if one.library is None}
+            blend, local = folder / "surfaces.blend", {one for one in objects.values() if one.library is None}
             bpy.data.libraries.write(str(blend), local, path_remap="ABSOLUTE", fake_user=True)
             materials = {slot.material for one in local for slot in one.material_slots if slot.material is not None}
             unsaved_images.write(folder, [one.node_tree for one in materials if one.node_tree is not None])
@@ -150,15 +149,20 @@ def _library_of(original):
 
 
 def find(objects, override, frame, for_render, waits):
-    """Return {session_uid of a mesh object: `Bake`} of evaluated objects whose materials need one.
+    """Return {session_uid of a mesh object: `Bake`} of those of the evaluated objects whose materials need one.
+
+    objects: read in turn, as Blender frees the objects of some instances when the next instance is read.
 
     override: the view layer's material; frame: the time of drivers of nodes; waits: return only once all are there.
     Without `waits` the last pictures of an object, or none, stand in for those that are being baked.
     """
-    wanted = {one.original.session_uid: one for one in objects if _needs_bake(one, override)}
-    paths = {uid: _path_of(one) for uid, one in wanted.items()}
-    # Linked objects have common pictures.
-    missing = {path: wanted[uid] for uid, path in paths.items() if not path.is_file()}
+    paths, originals = {}, {}
+    for one in objects:
+        uid = one.original.session_uid
+        if uid not in paths and _needs_bake(one, override):
+            paths[uid] = _path_of(one)
+            originals[paths[uid]] = one.original  # linked objects have common pictures
+    missing = {path: one for path, one in originals.items() if not path.is_file()}
     _start({path: one for path, one in missing.items() if not _is_known(path)}, frame, for_render, waits)
     for path, one in missing.items():
         baking = process_cache.get(path.stem)
