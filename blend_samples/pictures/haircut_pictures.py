@@ -91,7 +91,7 @@ def save_bare():
 
 
 def cut(name):
-    """Make a haircut in a window, which leaves its file. Raises `RuntimeError`."""
+    """Make a haircut in a window and save its file. Raises `RuntimeError`."""
     extension = build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
     profile, log = OUT / "profile", OUT / f"{name}.log"
     profile.mkdir(parents=True, exist_ok=True)

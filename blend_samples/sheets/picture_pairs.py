@@ -42,7 +42,7 @@ def structure(reference, picture):
 def block_error(reference, picture):
     """Return the mean difference of the means of 12 × 12 pixels with hair, in display levels of 255.
 
-    Noise of single pixels hardly matters. NaN without a block that is a quarter hair.
+    Noise of single pixels hardly matters. NaN if no block is at least a quarter hair.
     """
     exposure = _exposure(reference)
     first, second = (_block_means(255.0 * _displayed(one, exposure)) for one in (reference, picture))

@@ -20,11 +20,11 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
     """Vary a setting of hair Curves by a map, which replaces the setting's present map; returns the map.
 
     setting: such as "look.color", "styles.Curl.radius" of the style with the name Curl, or "guides.length" of its
-    guides; source: an image, or "image:NAME", "group:NAME" of
-    a vertex group, "attribute:NAME" of the surface, "curves:NAME" of an attribute of the hair's own curves, "strand" or
-    "clump" for random numbers; changes: fields of `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp,
-    course. ramp: a curve of the map's values such as "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that
-    gives the colors; course: as of `set_course`, by default the present one.
+    guides; source: an image, or "image:NAME", "group:NAME" of a vertex group, "attribute:NAME" of the surface,
+    "curves:NAME" of an attribute of the hair's own curves, "strand" or "clump" for random numbers; changes: fields of
+    `MapSettings`: uv, low, high, is_inverted, amount, seed, ramp, course. ramp: a curve of the map's values such as
+    "0:0 0.3:1 1:1", or a color ramp "0:0.1/0/0 1:1/0.8/0.5" that gives the colors; course: the curve that `set_course`
+    sets, by default the present one.
 
     >>> coat = bpy.data.images.new("Coat", 8, 8)
     >>> hair = bpy.data.objects["Hair"].data
@@ -49,10 +49,10 @@ def set_map(hair: Curves, setting: str, source: Image | str = "", **changes: Any
 
 
 def set_course(hair: Curves, setting: str, curve: str = "") -> None:
-    """Multiply a setting of a style from root to tip by a curve, such as "0:1 0.5:0.3 1:0"; empty: remove the curve.
+    """Multiply a setting of a style by a curve from root to tip, such as "0:1 0.5:0.3 1:0". Empty text removes it.
 
-    setting: such as "styles.Curl.radius" of the style with the name Curl; its map, if it has one, stays. Points of the
-    curve: as of `set_thickness_curve`.
+    setting: such as "styles.Curl.radius" of the style with the name Curl; a map of the setting stays. curve: points as
+    for `set_thickness_curve`.
 
     >>> hair = bpy.data.objects["Hair"].data
     >>> style = api.add_style(hair, "CURL")
@@ -78,7 +78,7 @@ def set_course(hair: Curves, setting: str, curve: str = "") -> None:
 
 
 def _course_of(target, setting):
-    """Return the text of the curve of a setting from root to tip; empty without one."""
+    """Return the curve from root to tip of a setting as text, which is empty without a curve."""
     item = blender.settings.map_items.item_of(target.vellus, setting)
     return "" if item is None else blender.settings.ramp_nodes.text_of(item.course_tree)
 

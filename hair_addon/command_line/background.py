@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures by Cycles for views and renders: panoramas of worlds and lights, and materials of meshes.
 
-blender/data/pictures runs these commands in a process of its own. They are for internal use and not listed.
+blender/data/pictures runs these commands in another process. They are for internal use and are not listed.
 """
 
 import json
@@ -25,7 +25,7 @@ def add(verbs):
     bake.add_argument("--sources", required=True, help="(file of the library, name) of the objects, a JSON list")
     bake.add_argument("--frame", type=float, default=1.0)
     bake.add_argument("--out", required=True, help="the folder of 0.npz, 1.npz, …")
-    bake.add_argument("--for-render", action="store_true", help="with the modifiers of renders")
+    bake.add_argument("--for-render", action="store_true", help="use the modifiers of renders")
     bake.set_defaults(run=bake_surfaces, json=True, quiet=False, verbose=False)
 
 

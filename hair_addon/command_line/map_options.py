@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Options of maps, --map look.color=image:coat.png, again for other settings; and of curves from root to tip."""
+"""Options of maps, such as --map look.color=image:coat.png, and of curves from root to tip."""
 
 import argparse
 from dataclasses import replace
@@ -36,7 +36,7 @@ def add_maps(parser):
         type=_parsed_course,
         action="append",
         default=[],
-        help="multiply a number of a style from root to tip by a curve, as in 'styles.Curl.radius=0:0 0.3:1 1:0.4'",
+        help="multiply a number of a style by a curve from root to tip, as in 'styles.Curl.radius=0:0 0.3:1 1:0.4'",
     )
     parser.add_argument(
         "--thickness-curve",
@@ -87,7 +87,7 @@ def _parsed_course(text):
 def mapped(given, settings):
     """Return `GroomSettings` with the maps and the curves of options; images are loaded. Raises `HairError`.
 
-    A map of an option keeps the curve from root to tip of the map that it replaces.
+    A map from an option keeps the curve from root to tip of the map that it replaces.
     """
     maps = {one.setting: one for one in settings.maps}
     for one in map(_loaded, given.maps):

@@ -24,7 +24,7 @@ _TEXELS = 13  # per object
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Hair objects with the same strands, look, light and textures, whose tints may differ.
+    """Hair objects with the same strands, look, light and textures; their tints may differ.
 
     to_world: (N, 4, 4); indices: (N,) among all hair of a picture; layers: (N,) layer of each object in the textures of
     the world's visibility, None for a single object with textures of its own; samplers: {name: texture} of the scene;

@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReadStyles:
-    """Styles of a hair, and the inputs that they refer to.
+    """Styles of a hair system, and the inputs that they refer to.
 
     applied: from the local coordinates in which the hair was generated, which define the axes and the origin of random
     shapes, to the present ones; length: source of the map of the strands' length; map_status: sentence about a missing
-    source of a map; numbers: of styles that maps or curves vary.
+    source of a map; numbers: the numbers of styles that maps or curves vary.
     """
 
     styles: tuple[StyleSettings, ...] = ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Numbers of styles that differ between strands by maps, or from root to tip by curves, such as the radius of curls."""
+"""Numbers of styles, such as the radius of curls, that maps vary between strands, or curves from root to tip."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ _OF_PLACES = ("IMAGE", "GROUP", "ATTRIBUTE")  # strands of a lock share the valu
 class VariedNumber:
     """A setting of a style that a map or a curve varies: its value and its `Param`.
 
-    source: `Source` of the map; course: (N,) samples of the curve from root to tip; None without.
+    source: `Source` of the map, or None; course: (N,) samples of the curve from root to tip, or None.
     """
 
     value: float
@@ -43,7 +43,7 @@ class VariedNumber:
         return is_same and are_same_courses(self.course, other.course)
 
     def number_map(self, source: sources.Source) -> NumberMap:
-        """Return the values for strands; source: of the map."""
+        """Return the `NumberMap` of the values of strands; source: the `Source` of the map."""
 
         def values(roots: SurfacePoints, identities: np.ndarray, clumps: np.ndarray | None) -> np.ndarray:
             masks = source.values(roots, identities, clumps)[:, 0]
@@ -78,7 +78,8 @@ def read(
         try:
             if course is not None and not details.has_course:
                 course = None
-                raise HairError('"{setting}" has no curve from root to tip: remove the curve.', setting=item.setting)
+                sentence = '"{setting}" cannot have a curve from root to tip: remove the curve.'
+                raise HairError(sentence, setting=item.setting)
             if map_items.is_set(item):
                 source = _source(item, hair, surface_object, surface, styles, place, details)
         except HairError as error:

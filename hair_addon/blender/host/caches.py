@@ -35,8 +35,9 @@ class Cache:
         return value
 
     def make_room(self, count):
-        """Keep `count` values of what is in use beside the capacity: values that are read in turn and do not all fit
-        would each be dropped before they are read again.
+        """Make room for `count` values that are in use, beyond the initial capacity.
+
+        Of values that are read in turn and do not all fit, each would be dropped before it is read again.
         """
         self._capacity = self._least + count
 

@@ -49,7 +49,7 @@ class VellusMap(bpy.types.PropertyGroup):
         "ramp_key": bpy.props.StringProperty(description="The ramp at the last update", options={"HIDDEN"}),
         "course_tree": bpy.props.PointerProperty(
             name="Curve",
-            description="Node group with the curve of the setting from root to tip",
+            description="Node group with the setting's curve from root to tip",
             translation_context=CONTEXT,
             type=bpy.types.NodeTree,
             options={"HIDDEN"},
@@ -109,7 +109,7 @@ def set_ramp(item: VellusMap, text: str) -> None:
 
 
 def set_course(item: VellusMap, text: str) -> None:
-    """Give a setting the curve of a text from root to tip, or none for an empty text.
+    """Set the curve from root to tip of a setting from a text; an empty text removes the curve.
 
     Raises `HairError` before anything changes.
     """

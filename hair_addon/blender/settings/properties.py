@@ -248,7 +248,7 @@ class VellusCurves(bpy.types.PropertyGroup):
             ("SYSTEM", "Hair System", "One color for the guides of each hair system"),
             ("GUIDE", "Guide", "A different color for each guide"),
             ("LENGTH", "Length", "From blue for the shortest guide to red for the longest one"),
-            ("CLUMP", "Clump", "One color for the guides of each clump of the first style that gathers strands"),
+            ("CLUMP", "Clump", "One color for each clump of guides, by the first style that gathers strands"),
             ("TIE", "Tie", "One color for the gathered guides of each tie or row; others are plain"),
         ],
         default="PLAIN",

@@ -34,7 +34,7 @@ def brush_annotations():
     return {
         "setting": bpy.props.EnumProperty(
             name="Setting",
-            description="Setting that the mouse changes",
+            description="Setting that moving the mouse changes",
             translation_context=CONTEXT,
             items=[
                 ("radius", "Radius", "Radius of the brush on the surface"),

@@ -13,7 +13,7 @@ _WIDTH = 1.5  # [pixels]
 
 
 def draw(context, brush, xy):
-    """Draw the circle of a brush, the properties of `vellus.paint_flow`, for the mouse at xy in the window [pixels]."""
+    """Draw the brush's circle at the mouse xy in the window [pixels]; brush: the properties of `vellus.paint_flow`."""
     region, view, guides = context.region, context.region_data, guides_of(context.object)
     if region is None or view is None or guides is None or guides.surface is None:
         return
@@ -29,12 +29,12 @@ def circle(context, guides, brush, mouse):
     radius = brush.radius if is_set else flow_painting.default_radius(guides) or brush.radius
     origin = view3d_utils.region_2d_to_origin_3d(context.region, context.region_data, mouse)
     direction = view3d_utils.region_2d_to_vector_3d(context.region, context.region_data, mouse)
-    # The evaluated scene as it is: drawing does not update it.
+    # Drawing does not update the evaluated scene.
     return flow_painting.brush_circle(guides.surface, origin, direction, radius, context.view_layer.depsgraph)
 
 
 def in_window(points, region, view):
-    """Return places (N, 2) of points (N, 3) in the window [pixels]; None if a point is behind the view, or for None."""
+    """Return places (N, 2) of points (N, 3) in the window [pixels]; None without points or with one behind the view."""
     if points is None:
         return None
     projected = np.pad(points, ((0, 0), (0, 1)), constant_values=1.0) @ np.array(view.perspective_matrix).T

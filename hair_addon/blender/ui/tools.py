@@ -25,7 +25,7 @@ def _draw_cursor(context, tool, xy):
 def _tool(mode):
     """Return the class of the tool for a mode, as each mode has its own toolbar."""
     members = {
-        "__doc__": "Drag over the surface to turn guides along the stroke",
+        "__doc__": "Turn guides toward the direction of strokes on the surface",
         "bl_space_type": "VIEW_3D",
         "bl_context_mode": mode,
         "bl_idname": PAINT_FLOW,

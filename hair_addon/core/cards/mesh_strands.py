@@ -269,8 +269,8 @@ def shown(strands: MeshStrands, alpha: np.ndarray) -> MeshStrands:
 def on_surface(strands: MeshStrands, surface: TriMesh) -> MeshStrands:
     """Return strands that begin on a surface [m]: cut where they leave it, or extended from the closest point.
 
-    Strands that begin far from it, or stay inside, do not change. A surface with normals inward counts as the same
-    surface with normals outward.
+    Strands that begin far from it, or stay inside, do not change. Normals that point inward
+    count as if they pointed outward.
     """
     query, starts = SurfaceQuery(surface), strands.starts
     points = strands.points.astype(np.float64)

@@ -17,8 +17,8 @@ _RECTANGULAR = 0.9  # area of a rectangular UV island relative to its bounding b
 _LONG = 1.5  # ratio of sides above which the longer sides run from root to tip
 _MOST_STATIONS = 64
 LEAST_STATIONS = 8
-_SMALL = 2_000  # inner vertices of pieces whose places are exact to rounding
-_EXACT, _CLOSE = 1e-26, 1e-18  # squares of residuals at which places are found, of small and of large pieces
+_SMALL = 2_000  # maximum number of inner vertices of pieces whose places are exact to rounding
+_EXACT, _CLOSE = 1e-26, 1e-18  # squared residuals at which the solution of small and large pieces ends
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ class AttractSettings(ToolSettings):
     )
     clearance: float = param(
         0.002,
-        "Distance between attracted guides and the surface, reached near their roots",
+        "Height of attracted guides above the surface; guides rise to it near their roots",
         low=0.0,
         high=1e3,
         soft_high=0.1,
@@ -144,7 +144,7 @@ class FlowSettings(ToolSettings):
 
     radius: float = param(
         0.03,
-        "Radius of the brush on the surface; guides near its edge turn less",
+        "Radius of the brush on the surface; guides near the edge of the brush turn less",
         above=0.0,
         high=1e6,
         soft_high=1.0,
@@ -153,7 +153,7 @@ class FlowSettings(ToolSettings):
     )
     strength: float = param(
         0.5,
-        "How far guides turn with each stroke; at 1, guides below the brush turn completely",
+        "How far each stroke turns guides; at 1, guides in the middle of a stroke take its direction",
         low=0.0,
         high=1.0,
         subtype="FACTOR",

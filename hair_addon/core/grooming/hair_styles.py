@@ -100,7 +100,7 @@ def bind_styles(
 
 
 def _below(of_styles):
-    """Return {(index of a style, name): value} for styles below one more style."""
+    """Return {(index of a style, name): value} with indices raised by one, as a style precedes these styles."""
     return {(place + 1, name): value for (place, name), value in of_styles.items()}
 
 

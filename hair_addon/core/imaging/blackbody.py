@@ -56,8 +56,9 @@ _FITS = (
 
 
 def blackbody_color(temperature: float) -> np.ndarray:
-    """Return the linear RGB (3,) of a black body at a temperature [K], with a luminance of 1 without the limit to
-    positive values.
+    """Return the linear RGB (3,) of a black body at a temperature [K].
+
+    The luminance is 1 before negative channels become 0.
     """
     if not temperature >= _LEAST:
         return np.array(_COLDEST)

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-_SAMPLES = 1 << 18  # of all triangles together
-_FEWEST, _MOST = 4, 1024  # samples of a triangle
+_SAMPLES = 1 << 18  # total over all triangles
+_FEWEST, _MOST = 4, 1024  # samples per triangle
 
 
 def triangle_means(pixels: np.ndarray, uvs: np.ndarray, extension: str = "REPEAT") -> np.ndarray:
@@ -32,7 +32,7 @@ def triangle_means(pixels: np.ndarray, uvs: np.ndarray, extension: str = "REPEAT
 
 
 def _barycentric(count):
-    """Return (count, 3) barycentric coordinates spread evenly over a triangle, by a lattice of rank one."""
+    """Return (count, 3) barycentric coordinates spread evenly over a triangle by a rank-1 lattice."""
     index = np.arange(count) + 0.5
     first, second = index / count, (index * 0.6180339887498949) % 1.0
     root = np.sqrt(first)
@@ -40,14 +40,14 @@ def _barycentric(count):
 
 
 def _level_of(corners, shape, samples, count):
-    """Return the level of each triangle whose pixels are about as large as its share of a triangle's samples."""
+    """Return a level for each triangle; its pixels are about as large as the area for one of the samples."""
     (x, y), size = (corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2), shape[1] * shape[0]
     area = 0.5 * size * np.abs(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])  # [pixels]
     return np.clip(0.5 * np.log2(np.maximum(area / samples, 1.0)), 0, count - 1).astype(int)
 
 
 def _levels(pixels):
-    """Return the image and means of its blocks of 2, 4, 8, … pixels a side, as long as they divide both sides."""
+    """Return the image and means of its blocks of 2, 4, 8, … pixels along a side, while these divide both sides."""
     levels = [pixels]
     while all(length > 1 and length % 2 == 0 for length in levels[-1].shape[:2]):
         height, width, channels = levels[-1].shape

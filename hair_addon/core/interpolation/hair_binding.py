@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .guide_weights import Candidates, GuideWeights, Limits
 
-# Largest movement of a strand's points by its turn against its guides, in mean distances of its guides.
+# Maximum movement of a strand's points by its turn relative to its guides, as a part of their mean distance.
 SPREAD = 0.25
 
 

@@ -15,12 +15,12 @@ normals are. With a frame F (tangent, bitangent, normal) at either root it is F_
 about the normal. So guides are transformed to their frames once, a neighbor costs five multiplications per point
 instead of nine, and the strand's frame is applied to the sum.
 
-A strand beyond its outermost guides, or on a rough surface, has another normal n than its guides. Long hair would turn
-with it: 5° move the tips of hair of 38 cm by 3 cm. So the frame of a strand turns against its guides only as far as no
-point moves by more than SPREAD of the mean distance of its guides: it has n, moved toward the mean normal of its guides
-until the chord between them is SPREAD (Σ w_j |g_j - q|) / (Σ w_j L_j), with guides' roots g_j and lengths L_j. Hair
-that is short beside the distance of its guides turns with the surface, and so does hair around edges and on thin
-sheets, where the normals are more than 60° apart (guide_sum.strand).
+Beyond the outermost guides, or on a rough surface, the normal n of a strand differs from the normals of its guides. If
+the strand turned by this difference, 5° would move the tips of hair of 38 cm by 3 cm. So a strand turns relative to its
+guides only as far as no point moves by more than SPREAD of the mean distance of its guides: the normal of its frame is
+n, moved toward the mean normal of its guides until the chord between them is SPREAD (Σ w_j |g_j - q|) / (Σ w_j L_j),
+with guides' roots g_j and lengths L_j. Hair that is short beside the distance of its guides turns with the surface, and
+so does hair around edges and on thin sheets, where the normals are more than 60° apart (guide_sum.strand).
 
 interpolation.cpp computes eight segments of a strand at once, in vector registers of a processor (Clang's vectors,
 which Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums over all

@@ -43,7 +43,7 @@ class MapSettings(Settings):
 
     @property
     def has_source(self) -> bool:
-        """Whether the map has a source: otherwise it has no values, and only its course has an effect."""
+        """Whether the map has a source. Without a source it has no values, and only its course has an effect."""
         return self.kind in ("STRAND", "CLUMP") or self.source != ""
 
     @property

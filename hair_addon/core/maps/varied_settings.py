@@ -71,7 +71,7 @@ def of_styles() -> tuple[str, ...]:
 
 @cache
 def with_course() -> frozenset[str]:
-    """Return the names of the settings of styles that a curve from root to tip may multiply, without styles' names."""
+    """Return the names of settings, without the names of styles, that may have a curve from root to tip."""
     return frozenset(name for kind in kinds.KINDS.values() for name in courses.settings_with_course(kind))
 
 
@@ -80,7 +80,7 @@ def require_course(setting: str) -> None:
     name, of_style = style_of(setting)
     if not name or of_style not in with_course():
         known = ", ".join(setting_of_style("NAME", each) for each in sorted(with_course()))
-        sentence = '"{setting}" has no curve from root to tip: use one of {known}.'
+        sentence = '"{setting}" cannot have a curve from root to tip: use one of {known}.'
         raise HairError(sentence, setting=setting, known=known)
 
 
@@ -101,7 +101,7 @@ def require_varied_or_course(setting: str) -> None:
 def require_map(settings: map_settings.MapSettings) -> None:
     """Raise `HairError` unless a map may vary its setting and has a ramp of the setting's kind.
 
-    A map without a source may also be of a setting that only a curve from root to tip can multiply.
+    The setting of a map without a source may be one that only a curve from root to tip can multiply.
     """
     require_varied_or_course(settings.setting)
     if settings.course:

@@ -191,5 +191,5 @@ class ClumpTrees:
 
     def _nearest(self, strands, centres):
         nearest = self.binder.nearest(strands, centres)
-        require_indices("clump centres", nearest[:, 0] + 1, len(centres.roots) + 1)
+        require_indices("clump centers", nearest[:, 0] + 1, len(centres.roots) + 1)
         return nearest

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Courses of numbers of styles: curves from root to tip by which a number is multiplied, such as the radius of curls.
+"""Courses: curves from root to tip that multiply numbers of styles, such as the radius of curls.
 
-A course is `SAMPLES` values at even fractions of a strand's length, with lines between. Each kind of step lists the
-settings that may have a course in `COURSES`, the amount first; its text asks for them by their places in this list.
+A course has `SAMPLES` values at even fractions of a strand's length, and is linear between them. Each kind of step
+lists the settings that may have a course in `COURSES`, the amount first; its .strand file reads them by their places
+in this list.
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from .base import StyleSettings
 
 SAMPLES = 64
 MOST_OF_A_STEP = 4  # courses that a step may have
-BITS = 7  # of the packed number of each course
+BITS = 7  # of the row of each course, packed into one integer
 LEAST = 0.1  # smallest factor of a length of waves or turns, which must be positive
 
 # Samples (N,) by (index of the style, name of its setting).
@@ -40,7 +41,7 @@ def at(course: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def are_same(one: np.ndarray | None, other: np.ndarray | None) -> bool:
-    """Return whether two courses, None for absent ones, are the same."""
+    """Return whether two courses are the same; None is no course."""
     if one is None or other is None:
         return one is other
     return np.array_equal(one, other)
@@ -54,7 +55,7 @@ class Table:
         self._rows: list[np.ndarray] = []
 
     def packed(self, courses: Courses, place: int, names: tuple[str, ...]) -> int:
-        """Return the rows of the courses of a step, from one, in `BITS` bits each; 0 in place of absent courses.
+        """Return the rows of a step's courses, packed with `BITS` bits each. Rows count from one; 0 is no course.
 
         place: index of the step's style; names: of the settings that may have a course. Raises `HairError`.
         """
@@ -68,7 +69,7 @@ class Table:
                     self._rows.append(samples)
                 found |= (row + 1) << (BITS * slot)
         if len(self._rows) >= 1 << BITS:
-            raise HairError("The styles of a hair may have at most {most} curves.", most=(1 << BITS) - 1)
+            raise HairError("The styles of a hair system can have at most {most} curves.", most=(1 << BITS) - 1)
         return found
 
     def rows(self) -> np.ndarray:

@@ -112,8 +112,8 @@ class Styling:
         if not len(centres):
             return
         into = self.data.centre_points
-        require_count("clump centres", len(rows), len(centres))
-        require_indices("clump centres", rows + first, len(into))
+        require_count("clump centers", len(rows), len(centres))
+        require_indices("clump centers", rows + first, len(into))
         require_count("points of a centre strand", into.shape[1], centres.shape[1])
         rows = wp.array(rows + first, dtype=int, device=centres.device)
         kernel_cache.launch(_with_arcs, len(centres), inputs=[centres, rows], outputs=[into], device=centres.device)

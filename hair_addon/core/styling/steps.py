@@ -71,7 +71,7 @@ class Variant:
 def variant(width: int, most_points: int, module: wp.Module | None = None, has_courses: bool = False) -> Variant:
     """Return a `Variant` in a Warp module, by default the module of this file; has_courses: for programs with courses.
 
-    Without courses, the code of courses would take 13 % more time of curls and 10 % of frizz.
+    With the code of courses, curls without courses would take 13 % more time, and frizz 10 %.
     """
     constants = _CONSTANTS | {"WIDTH": width, "MOST": most_points, "HAS_COURSES": int(has_courses)}
     if module is not None:
@@ -221,10 +221,10 @@ def _check(points, program, data, chosen, most_points):
     last_centres = first_centres + np.maximum(greatest[levels], 0) if len(data.members) else first_centres
     has_centres = levels >= 0
     has_centres[has_centres] = greatest[levels[has_centres]] >= 0
-    require_indices("clump centres", last_centres[has_centres], centre_count)
+    require_indices("clump centers", last_centres[has_centres], centre_count)
     needs_points = (_CONSTANTS["NEEDING_CENTRE"] >> step_kinds) & 1 == 1
     require_indices("clump levels", levels[needs_points], len(data.members))
     if needs_points.any():
         # The last centers may be guides, which have no points here.
-        require_indices("clump centres", last_centres[needs_points], min(len(data.centre_points), centre_count))
+        require_indices("clump centers", last_centres[needs_points], min(len(data.centre_points), centre_count))
         require_count("points of a centre strand", data.centre_points.shape[1], point_count)

@@ -166,7 +166,7 @@ def test_the_api_paints_as_the_operator_does(guides):
 
 @pytest.mark.parametrize("place", [Matrix.Scale(0.01, 4), Matrix.Diagonal((2.0, -0.5, 1.0, 1.0))])
 def test_the_circle_of_the_brush_lies_on_the_surface(guides, place):
-    """The points of the circle are at its radius in the world, in the plane of the surface as it is scaled."""
+    """Points of the circle are at its radius in the world and in the tangent plane of the scaled surface."""
     surface = guides.data.surface
     surface.matrix_world = Matrix.Translation((1.0, 2.0, 3.0)) @ place
     bpy.context.view_layer.update()
@@ -183,7 +183,7 @@ def test_the_circle_of_the_brush_lies_on_the_surface(guides, place):
 
 
 def test_the_circle_is_drawn_where_the_view_shows_it():
-    """Points of the world have the places of the window in which Blender's own projection shows them."""
+    """Points have the places in the window to which Blender's own function projects them."""
     view = SimpleNamespace(perspective_matrix=Matrix(((1.2, 0, 0, 0), (0, 2.1, 0, 0), (0, 0, -1, -2), (0, 0, -1, 0))))
     region = SimpleNamespace(width=300, height=200, x=20, y=10)
     points = np.array([(0.1, 0.2, -3.0), (-1.0, 0.4, -2.0)])

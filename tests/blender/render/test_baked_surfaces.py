@@ -232,8 +232,8 @@ def test_files_in_use_are_kept(tmp_path, monkeypatch):
 
 
 def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
-    """A view starts one process for all surfaces, and has plain colors with a sentence until it ends and after an
-    error.
+    """A view starts one process for all surfaces. Until it ends, and after an error, the view has plain colors and a
+    sentence.
     """
     placed = wall(bricks())
     wall(layered())
@@ -292,7 +292,7 @@ def test_instances_of_geometry_nodes_are_read_in_turn(stage, monkeypatch):
 
 
 def test_pictures_belong_to_nodes_and_meshes(stage):
-    """Pictures are kept while an object moves and poses; other nodes, attributes and faces have others."""
+    """Pictures are kept while an object moves or is posed; changed nodes, attributes and faces get new ones."""
     placed = wall(bricks())
 
     def path():

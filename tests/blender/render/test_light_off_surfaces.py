@@ -159,8 +159,9 @@ def test_light_off_a_surface_has_the_color_that_is_there(scene, source):
 
 @pytest.mark.parametrize("source", ["sun", "world"])
 def test_an_image_reflects_its_mean_color(scene, source):
-    """A plane with a fine checkered image reflects to strands the mean of its colors, also in a view that has changed
-    its image.
+    """A plane with a fine checkered image reflects the mean of its colors to strands.
+
+    A view also shows the mean after the image has changed.
     """
     tangent, towards = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8)
     set_light(scene, source)

@@ -159,9 +159,9 @@ def test_strands_stay_within_the_hull_of_their_guides(scene, rng):
 
 @pytest.mark.parametrize("length", [0.4, 0.01])
 def test_long_hair_does_not_spread_beyond_its_guides(rng, length):
-    """Strands beyond the outermost guides, which hang, move from their guides by a quarter of the guides' distance.
+    """Beyond the outermost guides, strands move away from hanging guides by a quarter of the distance of the guides.
 
-    Strands as short as the distance turn with the surface. Rotations to the mean of normals cancel in first order.
+    Strands as short as this distance turn with the surface. Rotations to the mean of normals cancel in first order.
     """
     directions = unit(rng.normal(size=(900, 3)))
     is_guide = directions[:, 0] < -0.3

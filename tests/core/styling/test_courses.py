@@ -84,7 +84,7 @@ def test_cut_strands_have_the_course_of_their_own_style(hair):
 
 @pytest.mark.parametrize(("name", "setting"), [pair for pair in SETTINGS if pair[1] not in ("pitch", "wavelength")])
 def test_a_constant_course_is_a_factor(hair, name, setting):
-    """Half a number everywhere is the number's half; roots of locks and progress of waves are computed alike."""
+    """A course of one half halves the number, also where it sets the roots of locks and the progress of waves."""
     style, above = CASES[name]
     half = hair.styled(*above, replace(style, **{setting: 0.5 * getattr(style, setting)}))
     found = styled(hair, name, {setting: np.full(3, 0.5)})

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The hands of an artist in Blender's window: buttons, fields, views, and strokes of the mouse, which are counted.
 
-A button or an entry of a menu calls its operator as a click on it does, with the mouse in the 3D view; a field gets its
-value as if it were typed. Strokes and lines are events of the mouse. Places are those of the scene [m]: what a stroke
-passes over in the view that was chosen before.
+A button or an entry of a menu calls its operator as a click does, with the mouse in the 3D view; a field is set as if
+its value were typed. Strokes and lines are events of the mouse. Places are in the scene [m]; a stroke passes over them
+in the view that was chosen before.
 """
 
 import time

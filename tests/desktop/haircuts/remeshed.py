@@ -29,7 +29,7 @@ from tests.desktop.window import (  # noqa: E402
 
 VOXEL = 0.005  # [m]
 COUNT, STRANDS = 400, 300
-_COMBED = 0.05  # distance by which combing moved a guide, over its length, from which the guide is combed
+_COMBED = 0.05  # a guide is combed if it moved by at least this part of its length
 
 STYLED = (
     *grown(0.28, drape=False),
@@ -54,7 +54,7 @@ def guides():
 
 
 def distances(found, others):
-    """Return (G,) mean distances of guides from those of the others with the nearest roots, over their lengths."""
+    """Return (G,) mean distances between guides and the others with the nearest roots, relative to their lengths."""
     tree = KDTree(len(others))
     for number, guide in enumerate(others):
         tree.insert(guide[0], number)

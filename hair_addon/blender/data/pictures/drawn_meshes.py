@@ -55,14 +55,14 @@ class DrawnMesh:
 
     @property
     def colors(self):
-        """(number of corners, linear RGB) of each material, in the corners' order; of images their mean over it."""
+        """(number of corners, linear RGB) of each material, in the order of corners; for images the mean color."""
         parts = zip(self.materials, self._image_means, strict=True)
         return tuple((count, material.color if means is None else means.of_part) for (count, material), means in parts)
 
     @property
     def triangle_materials(self):
-        """(F, 6) float32 of each triangle's material: linear RGB, roughness, metallic, reflectance; of images their
-        mean over the triangle.
+        """(F, 6) float32 of each triangle's material: linear RGB, roughness, metallic, reflectance; for images
+        the mean color over the triangle.
         """
         rows = [
             (*material.color, material.roughness, material.metallic, material.reflectance)
@@ -78,7 +78,7 @@ class DrawnMesh:
 
     @cached_property
     def _image_means(self):
-        """`surface_means.ImageMeans` of each material, None without an image of its color."""
+        """`surface_means.ImageMeans` of each material; None if its color is not from an image."""
         first, found = 0, []
         for count, material in self.materials:
             corners = slice(first, first + count)
@@ -151,7 +151,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
 
 
 def _bakes(depsgraph, viewport, override):
-    """Return {session_uid: `Bake`} of the objects that a viewport or a render shows; a render waits for them."""
+    """Return {session_uid: `Bake`} of the objects that a viewport or a render shows; a render waits for bakes."""
     if not any(unread_nodes.baked_labels(material) for material in bpy.data.materials):
         return {}  # without reading the instances once more
     shown = (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are made once and kept: in the user's folder of the extension, or as long as Blender runs."""
+"""Files that are made once and kept: in the extension's user folder, or until Blender quits."""
 
 import os
 import tempfile
@@ -13,7 +13,7 @@ _MOST_KEPT = 64  # files
 
 
 def folder(name):
-    """Return the folder of files of a kind."""
+    """Return the folder for files of a kind."""
     if preferences.is_extension():
         found = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path=name, create=True)
         # Empty if Blender could not create it, which it reports on the console.
@@ -25,7 +25,7 @@ def folder(name):
 
 
 def remove_oldest(path, used=frozenset()):
-    """Remove the oldest files beside a file, of the same kind, if there are too many; `used` files stay."""
+    """Remove the oldest files with the suffix of a file from its folder, if there are too many; `used` files stay."""
     files = [file for file in path.parent.glob(f"*{path.suffix}") if file not in used]
     for file in sorted(files, key=_time_of)[:-_MOST_KEPT]:
         file.unlink(missing_ok=True)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of surfaces whose materials have nodes that Vellus does not read: another process bakes them once.
+"""Pictures of surfaces whose materials have nodes that Vellus does not read. Another process bakes them once.
 
-The pictures of an object are kept by the digest of its materials and its mesh.
+Pictures of an object are stored under the digest of its materials and its mesh.
 """
 
 import hashlib
@@ -43,7 +43,7 @@ class Bake:
     """Pictures of the materials of an object.
 
     uvs: (C, 2) float32 of the corners of its mesh; surface: linear color and roughness; normal: in tangent space, None
-    without nodes of normals; metallic, weight: (H, W) float16, weight: the part of the surface that is opaque.
+    without nodes of normals; metallic, weight: (H, W) float16. The weight is the opaque part of the surface.
     """
 
     uvs: np.ndarray
@@ -53,17 +53,17 @@ class Bake:
     weight: np.ndarray
 
     def fits(self, corner_count, name):
-        """Whether a mesh has the corners of the pictures; if not, print a message."""
+        """Whether a mesh has the corners of the pictures; prints a message if not."""
         if len(self.uvs) != corner_count:
             say(
-                f'The baked materials of "{name}" belong to another mesh: apply modifiers that change it at each frame.'
+                f'The baked materials of "{name}" do not fit its mesh: apply modifiers that change its faces over time.'
             )
         return len(self.uvs) == corner_count
 
     def material(self, plain, loops):
         """Return a `SurfaceMaterial` with the pictures; loops: (3 F,) indices of its corners."""
         metallic, weight = self.means(loops)
-        if weight < 0.5:  # more of the surface is transparent than opaque
+        if weight < 0.5:  # mostly transparent
             return surface_materials.SurfaceMaterial(is_clear=True, name=plain.name, index=plain.index)
         every, roughness = (0.2126, 0.7152, 0.0722, 0.0), (0.0, 0.0, 0.0, 1.0)
         color_image, roughness_image, normal_image = (
@@ -114,7 +114,7 @@ class _Baking:
 
     @property
     def is_running(self):
-        """Whether it runs, or its end has not been handled yet."""
+        """Whether the process runs, or its end has not been handled yet."""
         return self._process is not None
 
     @property
@@ -124,7 +124,7 @@ class _Baking:
         return [(self._names[path], self.reasons.get(path, "")) for path in shown]
 
     def is_ended(self, waits):
-        """Whether it has ended, after waiting if `waits`; the files are then in their places, or there is a reason."""
+        """Whether the process has ended; waits: wait for its end. Then the files are in place, or there is a reason."""
         if self._process is not None and waits:
             self._process.wait(_PATIENCE)
         if self._process is None or self._process.is_running:
@@ -153,8 +153,8 @@ def find(objects, override, frame, for_render, waits):
 
     objects: read in turn, as Blender frees the objects of some instances when the next instance is read.
 
-    override: the view layer's material; frame: the time of drivers of nodes; waits: return only once all are there.
-    Without `waits` the last pictures of an object, or none, stand in for those that are being baked.
+    override: the view layer's material; frame: the time of drivers of nodes; waits: return only when all are baked.
+    Without `waits`, the most recent pictures of an object, if there are any, are used until its new pictures are baked.
     """
     paths, originals = {}, {}
     for one in objects:
@@ -180,7 +180,7 @@ def find(objects, override, frame, for_render, waits):
 
 
 def add_uv_map(mesh, name, uvs):
-    """Add a UV map (C, 2) to a mesh as the active one, while renders use the former one; None if there are too many."""
+    """Add a UV map (C, 2) and make it active, but not for renders. Returns None if the mesh has too many UV maps."""
     shown = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
     layer = mesh.uv_layers.new(name=name, do_init=False)
     if layer is None:
@@ -194,13 +194,13 @@ def add_uv_map(mesh, name, uvs):
 
 
 def _is_known(path):
-    """Whether pictures without a file are being baked, or cannot be."""
+    """Whether pictures without a file are being baked or cannot be baked."""
     baking = process_cache.get(path.stem)
     return baking is not None and (baking.is_running or path in baking.reasons)
 
 
 def _start(objects, frame, for_render, waits):
-    """Start a process for {path: object}; a view has one process, as dragged or played nodes change."""
+    """Start a process for {path: object}. Viewports have at most one at a time, as nodes may change in each frame."""
     if not objects or (not waits and _running()):
         return
     baking = _Baking(objects, frame, for_render)
@@ -222,8 +222,8 @@ def look():
 
 
 def sentences():
-    """Translated sentences about surfaces that are baked now or cannot be, for panels."""
-    text = 'Cycles bakes the materials of "{name}". Until then it is drawn as before, or in plain color.'
+    """Translated sentences for panels, about surfaces whose bake is running or has failed."""
+    text = 'Cycles is baking the materials of "{name}". Until then, their previous pictures or plain colors are shown.'
     failed = 'Cycles cannot bake the materials of "{name}": {reason}'
     found = []
     for baking in dict.fromkeys(process_cache.values()):
@@ -276,7 +276,7 @@ _COMPONENTS = {
 
 
 def _is_placed(material):
-    """Whether a material depends on the place, the name or custom properties of its object."""
+    """Whether a material depends on the transform, name, color or custom properties of its object."""
     return material.node_tree is not None and any(
         one.type in {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"}
         or (one.type == "ATTRIBUTE" and one.node.attribute_type != "GEOMETRY")
@@ -286,7 +286,7 @@ def _is_placed(material):
 
 
 def _read(path):
-    """Return the `Bake` of a file; None if it is damaged, and it is baked again."""
+    """Return the `Bake` of a file. A damaged file is removed and gives None, so it is baked again."""
     try:
         return _read_arrays(path)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):

@@ -22,11 +22,11 @@ _EXTENSIONS = {"REPEAT": "REPEAT", "EXTEND": "EXTEND", "CLIP": "CLAMP_TO_BORDER"
 
 @dataclass(frozen=True)
 class ImageMap:
-    """An image of a material: Blender's, or a `surface_bakes.BakedPicture`. uv_map: name of its UV map, "" for the
-    active one.
+    """An image of a material: an image of Blender or a `surface_bakes.BakedPicture`.
 
-    rows: (2, 3) float, from (u, v, 1) to coordinates of the image; channels: (4,) weights of RGBA for an image that is
-    read as a number; extension: of a GPU texture; is_opaque: whether alpha does not darken the color.
+    uv_map: name of its UV map, "" for the active UV map; rows: (2, 3) float, from (u, v, 1) to coordinates of
+    the image; channels: (4,) weights of RGBA for an image that is read as a number; extension: of a GPU texture;
+    is_opaque: whether alpha does not darken the color.
     """
 
     image: object
@@ -186,8 +186,9 @@ def _image_map(shader_input, material, uv_map=""):
 
 
 def reads_image(shader_input):
-    """Whether a `ShaderInput` reads an image that `read_material` reads, or that no picture can be baked of: movies and
-    sequences. The file is not loaded.
+    """Whether a `ShaderInput` reads an image that `read_material` reads, or a movie or sequence, which is not baked.
+
+    The file is not loaded.
     """
     found, _output = shader_input.source()
     if found is not None and found.type == "SEPARATE_COLOR" and found.node.mode == "RGB":

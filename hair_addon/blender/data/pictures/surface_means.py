@@ -14,15 +14,14 @@ from ..maps import image_pixels
 
 _SIDE = 512  # texels along a side of reduced pictures
 
-picture_cache = Cache(
-    capacity=64
-)  # session_uid of an image → (its settings, (H, W, 4) float32); cleared if images change
+# session_uid of an image → (its settings, (H, W, 4) float32); cleared when images change
+picture_cache = Cache(capacity=64)
 mean_cache = Cache(capacity=64)  # (session_uid of an image, number of corners) → `_Known`
 
 
 @dataclass(frozen=True, eq=False)
 class ImageMeans:
-    """Mean colors of an image: (F, 3) float32 of triangles; of_part: linear RGB of all of them."""
+    """Mean colors of an image. of_triangles: (F, 3) float32; of_part: linear RGB of all triangles together."""
 
     of_triangles: np.ndarray
     of_part: tuple
@@ -30,7 +29,7 @@ class ImageMeans:
 
 @dataclass(frozen=True, eq=False)
 class _Known:
-    """Inputs of `ImageMeans` at their last use. picture: the array of pixels, another one after a change."""
+    """Inputs of `ImageMeans` at their last use. picture: the array of pixels, which a change replaces."""
 
     picture: np.ndarray
     image_map: object
@@ -50,7 +49,7 @@ class _Known:
 def of_image(image_map, uvs):
     """Return the `ImageMeans` of a `surface_materials.ImageMap` over triangles; None if its pixels cannot be read.
 
-    uvs: (3 F, 2) of their corners.
+    uvs: (3 F, 2) of the corners of the triangles.
     """
     image = image_map.image
     is_baked = not isinstance(image, bpy.types.Image)
@@ -88,9 +87,9 @@ def _picture_of(image):
 
 
 def _reduced(raw):
-    """Return some pixels of each block of a picture, as blocks of two by two, if it is larger than `_SIDE`.
+    """Return a picture that is larger than `_SIDE` with two by two pixels of each of its blocks.
 
-    They are picked at random, as patterns of bricks or threads repeat as blocks do.
+    Pixels are picked at random, because patterns of bricks or threads may repeat with the blocks.
     """
     height, width = raw.shape[:2]
     step = -(-max(height, width) // _SIDE)
@@ -113,7 +112,7 @@ def _as_drawn(picture, image, image_map):
 def _of_part(means, uvs):
     """Return the mean color of triangles (F, 3) with UVs (3 F, 2), weighted by their areas in the UV map.
 
-    They stay the same while a surface deforms.
+    These areas stay the same while a surface deforms.
     """
     first, second, third = uvs.reshape(-1, 3, 2).transpose(1, 0, 2).astype(np.float64)
     (u, v), (x, y) = (second - first).T, (third - first).T

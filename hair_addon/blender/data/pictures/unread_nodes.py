@@ -39,7 +39,7 @@ _BAKED = {"Base Color", "Color", "Roughness", "Metallic", "Normal"}  # inputs of
 
 
 def baked_labels(material):
-    """Return the labels of the nodes of a material for which Cycles bakes it; empty if it is read without."""
+    """Return the labels of the nodes that make Cycles bake a material; empty if no bake is needed."""
     shader = None if material is None else _shown(material.node_tree)
     if shader is None or shader.type in _UNBAKED:
         return []
@@ -54,7 +54,7 @@ _UNBAKED = {"HOLDOUT", "EMISSION", "BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"}
 
 
 def _unread_values(material):
-    """Return the labels of nodes of a material that neither are read nor baked."""
+    """Return the labels of the nodes of a material that are neither read nor baked."""
     shader = _shown(material.node_tree)
     names = None if shader is None else surface_materials.inputs_read(shader, material)
     names = [name for name in names or () if name not in _BAKED or shader.type == "BSDF_GLASS"]

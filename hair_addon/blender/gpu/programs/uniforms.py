@@ -192,7 +192,7 @@ MAKING = Block(
 )
 
 MOST_STEPS = 64  # maximum number of steps that the GPU applies to one hair
-MOST_COURSES = 16  # maximum number of courses of their numbers
+MOST_COURSES = 16  # maximum number of courses of all steps
 
 STEP = Block(
     "Step",

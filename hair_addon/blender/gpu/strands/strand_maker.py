@@ -25,7 +25,7 @@ class StrandMaker:
 
     bindings: gpu.types.GPUTexture  # for each strand its root, its normal, and its guides with weights
     guide_normals: gpu.types.GPUTexture
-    segments: gpu.types.GPUTexture  # of guides, in their frames; then the limits of their weights, and their roots
+    segments: gpu.types.GPUTexture  # of guides, in the frames of their roots; then limits of weights, and roots
     changes: StrandChanges | None  # None if strands are made for styles
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf

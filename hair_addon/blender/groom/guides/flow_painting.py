@@ -121,9 +121,9 @@ def place_on(surface: Object, origin: Vector, direction: Vector, depsgraph: Deps
 def brush_circle(
     surface: Object, origin: Vector, direction: Vector, radius: float, depsgraph: Depsgraph
 ) -> np.ndarray | None:
-    """Return points (N, 3) of the brush's circle where a ray first hits a posed surface, in world coordinates, or None.
+    """Return points (N, 3) of the brush's circle, in world coordinates; None if the ray does not hit the posed surface.
 
-    radius: of the brush in world coordinates. The circle lies in the plane of the surface.
+    The center is the first hit of the ray, and the circle is tangent to the surface. radius: in world coordinates.
     """
     found = _hit(surface, origin, direction, depsgraph)
     if found is None:
@@ -134,19 +134,19 @@ def brush_circle(
     length = np.linalg.norm(normal)
     if not length > 0.0:
         return None
-    across = np.linalg.svd(normal[None] / length)[2][1:]  # two unit vectors in the plane
+    across = np.linalg.svd(normal[None] / length)[2][1:]  # two unit vectors of the tangent plane
     turn = np.linspace(0.0, 2.0 * np.pi, _CIRCLE, endpoint=False)[:, None]
     return middle + radius * (np.cos(turn) * across[0] + np.sin(turn) * across[1])
 
 
 def default_radius(datablock: Curves) -> float | None:
-    """Return the radius of a brush [m] that fits the surface of guides; None without a surface."""
+    """Return a radius of the brush [m] that fits the surface of guides; None without a surface."""
     size = guide_tools.surface_size(datablock)
     return _PART * size if size else None
 
 
 def _hit(surface, origin, direction, depsgraph):
-    """Return (place, normal) where a ray in world coordinates first hits a surface, in its coordinates, or None."""
+    """Return (place, normal), in local coordinates, of a surface's first hit by a ray in world coordinates, or None."""
     to_local = surface.matrix_world.inverted_safe()
     start = to_local @ origin
     is_hit, place, normal, _face = surface.evaluated_get(depsgraph).ray_cast(start, to_local.to_3x3() @ direction)

@@ -14,14 +14,14 @@ from ...data.pictures import surface_bakes, unsaved_images
 from ...data.pictures.shader_sockets import nodes_of
 from ...host import scene_time
 
-SIDE = 1024  # texels of a picture, more for meshes with many faces
-IMAGE_SIDE = 2048  # of materials with images
+SIDE = 1024  # texels along a side of a picture; more for meshes with many faces
+IMAGE_SIDE = 2048  # the same for materials with images
 _MARGIN = 2  # texels
 _ATLAS = "vellus_atlas"
 _LARGEST = 6e4  # of half floats
 _OF_NORMALS = {"BUMP", "NORMAL_MAP", "BEVEL"}
 
-# Input with the color of each shader that reflects; whether it is a metal.
+# Shaders that reflect → name of the input with their color, and whether they are metals.
 _COLORS = {
     "BSDF_PRINCIPLED": ("Base Color", False),
     "BSDF_DIFFUSE": ("Color", False),
@@ -42,9 +42,9 @@ def bake(path, sources, frame, for_render, out):
     cannot be baked. Raises `HairError` if files cannot be read.
 
     sources: (path of the library of a linked object, or "" for the .blend at `path`; name of the object) of each mesh.
-    Surfaces have the shape without modifiers that only deform, so that patterns stay in place on posed surfaces. Each
-    file has `uvs` (C, 2) of the mesh's corners; `color` (H, W, 3), `roughness`, `metallic` and `weight` (H, W),
-    the opaque part, float16; `normal` (H, W, 3) in tangent space, encoded from 0 to 1, empty without nodes of normals.
+    Modifiers that only deform are turned off, so that patterns stay in place on posed surfaces. Each file has `uvs`
+    (C, 2) of the mesh's corners; float16 `color` (H, W, 3), `roughness`, `metallic` and `weight` (H, W), which is the
+    opaque part; `normal` (H, W, 3) in tangent space, encoded from 0 to 1, empty without nodes of normals.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -212,7 +212,7 @@ def _replace(tree, shader, color, is_metal, weight=1.0):
 
 
 def _pass_on(tree, source, default, target):
-    """Let a socket have the value of an input, or a default without one."""
+    """Link a socket to what an input is linked to, or copy its value; default: the value without an input."""
     if source is None:
         target.default_value = default
     elif source.is_linked and not source.links[0].is_muted:

@@ -21,7 +21,7 @@ _MOST_OF_STILL = 96.0  # if only lights have moved: the picture is not blurred, 
 
 
 class _Targets:
-    """Textures that a program fills. images: (name, format) of `picture_programs` of each."""
+    """Textures that a program fills. images: (name, format) of each, from `picture_programs`."""
 
     def __init__(self, size, images):
         self.size, self._names = size, [name for name, _format in images]

@@ -21,7 +21,7 @@ _RANGE = 300.0  # movement of the mouse from no strength to full strength [pixel
 
 
 class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
-    """Drag over the surface to turn guides along the stroke; roots and lengths are kept"""
+    """Turn guides toward the direction of strokes on the surface, keeping roots and lengths"""
 
     bl_idname = "vellus.paint_flow"
     bl_label = "Paint Flow"
@@ -105,7 +105,7 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
 
 
 class VELLUS_OT_size_flow_brush(bpy.types.Operator):
-    """Change the radius or the strength of Paint Flow by moving the mouse sideways"""
+    """Change the radius or strength of the Paint Flow brush by moving the mouse sideways"""
 
     bl_idname = "vellus.size_flow_brush"
     bl_label = "Size Flow Brush"

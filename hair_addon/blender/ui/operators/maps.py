@@ -130,7 +130,7 @@ class VELLUS_OT_remove_map_ramp(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_add_course(HairOperator, bpy.types.Operator):
-    """Multiply the setting from root to tip by a curve, which begins as 1 everywhere"""
+    """Multiply the setting by a curve from root to tip. A new curve is 1 everywhere and changes nothing"""
 
     bl_idname = "vellus.add_course"
     bl_label = "Curve from Root to Tip"
@@ -148,7 +148,7 @@ class VELLUS_OT_add_course(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_remove_course(HairOperator, bpy.types.Operator):
-    """Remove the curve: the setting is the same from root to tip"""
+    """Remove the curve, so that the setting is the same from root to tip"""
 
     bl_idname = "vellus.remove_course"
     bl_label = "Remove Curve"

@@ -13,17 +13,17 @@ _LARGEST_SIDE = 4096  # texels
 
 
 def face_atlas(faces: Faces, vertices: np.ndarray, side: int) -> tuple[np.ndarray, int]:
-    """Return ((C, 2) float32 UVs of corners, texels along a side of the picture, at least `side`, a power of two).
+    """Return ((C, 2) float32 UVs of corners, side of the picture [texels]: a power of two, at least `side`).
 
     vertices: (V, 3); blocks are larger for larger polygons. The first corners of a triangle and the corners of a quad
-    are corners of its block, one texel inside of it; other polygons are regular. Raises `HairError` for meshes with
+    are at the corners of its block, one texel inside; other polygons are regular. Raises `HairError` for meshes with
     too many polygons.
     """
     count = len(faces.starts) - 1
     while count * _LEAST**2 > side * side:
         side *= 2
     if side > _LARGEST_SIDE:
-        raise HairError("Pictures of materials need meshes of fewer than a million faces.")
+        raise HairError("Materials can be baked only on meshes with fewer than a million faces.")
     sizes = _block_sizes(_areas(faces, vertices), side)
     order = np.argsort(-sizes, kind="stable")
     ends = np.cumsum(sizes[order] ** 2)
@@ -37,7 +37,7 @@ def face_atlas(faces: Faces, vertices: np.ndarray, side: int) -> tuple[np.ndarra
 
 
 def _areas(faces, vertices):
-    """Return (F,) areas of polygons, by Newell's normals; non-finite ones as 0."""
+    """Return (F,) areas of polygons, by Newell's normals; 0 for non-finite areas."""
     places = np.asarray(vertices, np.float64)[faces.corner_vertices]
     following = np.arange(1, len(places) + 1)
     following[faces.starts[1:] - 1] = faces.starts[:-1]
@@ -48,7 +48,7 @@ def _areas(faces, vertices):
 
 
 def _block_sizes(areas, side):
-    """Return (F,) sides of blocks: powers of two, about as the roots of areas, that fit into a square."""
+    """Return (F,) sides of blocks that fit into a square: powers of two, about proportional to the roots of areas."""
     largest = int(math.log2(side))
     with np.errstate(divide="ignore"):
         roots = 0.5 * np.log2(areas / (areas.sum() or 1.0)) + largest

@@ -237,7 +237,7 @@ class PathSums:
 
 
 def of_each(make: Callable[[Any], Any], values: Sequence[Any]) -> list[Any]:
-    """Return make(value) of each value, computed once for the same object, as linked hair has common sums."""
+    """Return make(value) of each value, computed once for each object, as linked hair has common sums."""
     made = {id(value): value for value in values}
     made = {key: make(value) for key, value in made.items()}
     return [made[id(value)] for value in values]

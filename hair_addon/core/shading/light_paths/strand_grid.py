@@ -38,7 +38,7 @@ class Strands:
     absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) if all strands are equal, at root
     and tip; gradient: (P,) fraction of the tip's absorption at each point; fibre: (S,) index of each strand's settings
     among the settings given to `build`; kind: equal for systems with the same strands and look, whose light is summed
-    together, None: the light is summed by itself.
+    together; None if the light of the system has its own sums.
     """
 
     points: np.ndarray  # (S, P, 3)

@@ -123,7 +123,7 @@ def test_heads_with_light_grid_are_drawn_together_in_the_same_light(thin, monkey
 
 
 def test_surfaces_of_a_crowd_are_uploaded_and_triangulated_once(thin, monkeypatch):
-    """Also those of more heads than the caches hold for one head."""
+    """The caches make room for the surfaces of all heads."""
     link(thin, PLACES)
     for cache in (surface_textures.surface_cache, drawn_meshes.layout_cache):
         monkeypatch.setattr(cache, "_least", 2)

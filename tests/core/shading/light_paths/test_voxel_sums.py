@@ -74,7 +74,7 @@ def test_values_are_added_to_their_hair_and_voxel(rng, monkeypatch, way):
 
 
 def test_linked_hair_has_common_sums(rng):
-    """The sums of two hairs of the same kind are those of both hairs, added."""
+    """The sums of two hair systems of the same kind are the sums of each, added."""
     state = rng.bit_generator.state
     grid = two_systems(rng)
     rng.bit_generator.state = state
