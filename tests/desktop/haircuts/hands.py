@@ -15,7 +15,7 @@ from mathutils import Vector
 
 from tests.desktop import window
 
-ACTION_SECONDS = 2.0  # an artist's time for one click, field, view or stroke: an estimate
+ACTION_SECONDS = 2.0  # estimated time of an artist for one click, field, view or stroke
 STRANDS = 40_000  # of a picture; the window shows fewer
 _EVENTS_PER_METER = 80.0
 _COMB = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"

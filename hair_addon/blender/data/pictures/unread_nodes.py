@@ -12,8 +12,8 @@ sentence_cache = Cache()  # session_uid of a scene → `sentences` of it
 
 _OF_LIGHTS = "Cycles renders these nodes of lights. Hair and surfaces receive the mean light toward hair: {names}."
 _OF_FALLOFFS = "Light Falloff nodes have the strength of Quadratic without Smooth, at all distances: {names}."
-_OF_MATERIALS = "Only values of these inputs of surfaces' shaders are read, not the nodes: {names}."
-_OF_BAKED = "Cycles bakes these nodes of materials on surfaces: {names}."
+_OF_MATERIALS = "Nodes of these inputs of surface shaders have no effect, only their values: {names}."
+_OF_BAKED = "Cycles bakes these nodes of surface materials: {names}."
 
 
 def shown_sentences(scene):
