@@ -14,11 +14,11 @@ blender = lazy.Package("..blender", __package__)
 def add(verbs):
     """Add the options of the commands."""
     panorama = verbs.add_parser("panorama")
-    panorama.add_argument("input", help="a .blend with one world, or with a light")
+    panorama.add_argument("input", help="a .blend with the world or light")
     panorama.add_argument("--out", required=True, help="the .exr, or the .npz of a light")
     panorama.add_argument("--frame", type=float, default=1.0)
-    panorama.add_argument("--light", help="name of the light")
-    panorama.add_argument("--matrix", default="null", help="rows of the light's matrix, a JSON list")
+    panorama.add_argument("--name", required=True, help="of the world or light")
+    panorama.add_argument("--matrix", help="rows of the light's matrix, a JSON list; none for a world")
     panorama.set_defaults(run=run, json=True, quiet=False, verbose=False)
     bake = verbs.add_parser("bake_surfaces")
     bake.add_argument("input", help="a .blend with the meshes")
@@ -32,11 +32,11 @@ def add(verbs):
 def run(given, console):
     """Render a panorama of a file's world, or of one of its lights."""
     pictures = blender.io.pictures
-    if given.light is None:
-        pictures.world_panorama.render(given.input, given.frame, given.out)
+    if given.matrix is None:
+        pictures.world_panorama.render(given.input, given.name, given.frame, given.out)
     else:
         matrix = json.loads(given.matrix)
-        pictures.light_panorama.render(given.input, given.light, matrix, given.frame, given.out)
+        pictures.light_panorama.render(given.input, given.name, matrix, given.frame, given.out)
     console.result({"panorama": given.out}, "")
 
 

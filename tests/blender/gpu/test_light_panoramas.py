@@ -150,7 +150,7 @@ def test_light_of_nodes_arrives_as_in_cycles(scene, tmp_path, monkeypatch, name)
     if name.endswith("IES"):
         monkeypatch.setattr(light_panorama, "SAMPLES", 4)
         monkeypatch.setattr(light_panorama, "SIZE", (128, 64))
-    light_panorama.render(tmp_path / "light.blend", "Lamp", json.loads(options[0][3]), 1.0, tmp_path / "light.npz")
+    light_panorama.render(tmp_path / "light.blend", "Lamp", json.loads(options[0][1]), 1.0, tmp_path / "light.npz")
     factor = light_panoramas._read(tmp_path / "light.npz").factor(place, PLACE)
     np.testing.assert_allclose(factor, shone, rtol=0.02)
 

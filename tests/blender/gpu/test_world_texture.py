@@ -166,6 +166,21 @@ def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path, monkeypatch):
     np.testing.assert_allclose(unrolled, rendered, rtol=0.02, atol=0.01)
 
 
+@pytest.mark.farm
+def test_linked_worlds_are_rendered_from_their_libraries(scene, tmp_path):
+    """A linked world beside others in its library has its panorama."""
+    mixed_world(scene)
+    scene.world.name = "Sky"
+    bpy.data.libraries.write(str(tmp_path / "skies.blend"), {scene.world, bpy.data.worlds.new("Other")})
+    bpy.data.worlds.remove(scene.world)
+    with bpy.data.libraries.load(str(tmp_path / "skies.blend"), link=True) as (_names, wanted):
+        wanted.worlds = ["Sky"]
+    scene.world = wanted.worlds[0]
+    mixing = next(one for one in scene.world.node_tree.nodes if one.type == "BACKGROUND")
+    mixing.name = "Linked"  # nodes of no other test
+    assert world_panoramas.file_of(scene.world, 1.0, waits=True).is_file()
+
+
 def test_the_digest_of_a_world_does_not_depend_on_the_order_of_its_links(scene):
     mixed_world(scene)
     before, tree = world_digest.digest_of(scene.world), scene.world.node_tree

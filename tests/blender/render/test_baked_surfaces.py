@@ -260,7 +260,7 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
 
 def test_the_other_process_knows_its_commands():
     for verb in ("panorama", "bake_surfaces"):
-        words = [verb, "a.blend", "--out", "b", *(["--sources", "[]"] if verb == "bake_surfaces" else [])]
+        words = [verb, "a.blend", "--out", "b", *(["--sources", "[]"] if verb == "bake_surfaces" else ["--name", "c"])]
         assert callable(command_line.parser("vellus").parse_args(words).run)
 
 

@@ -71,7 +71,7 @@ def find(light, matrix, frame, waits):
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
     found.update(repr((rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
-    options = ["--light", light.original.name, "--matrix", json.dumps(rows)]
+    options = ["--matrix", json.dumps(rows)]
     path = world_panoramas.kept_or_rendered(light, path, frame, waits, options) or world_panoramas.last_of(light)
     return None if path is None else picture_cache.get(path, lambda: _read(path))
 

@@ -98,7 +98,7 @@ class _Baking:
 
     def __init__(self, objects, frame, for_render):
         self.reasons, self._names = {}, {path: name_of(one) for path, one in objects.items()}
-        sources = [(_library_of(one), one.name) for one in objects.values()]
+        sources = [(world_panoramas.library_of(one), one.name) for one in objects.values()]
         words = ["--sources", json.dumps(sources), "--frame", repr(frame), *(["--for-render"] if for_render else [])]
         try:
             parent = next(iter(objects)).parent
@@ -140,12 +140,6 @@ class _Baking:
                 self.reasons[path] = told or cause_of(error)
         self._folder.cleanup()
         return True
-
-
-def _library_of(original):
-    """Return the path of the library of a linked object, "" for a local one."""
-    library = original.library
-    return "" if library is None else bpy.path.abspath(library.filepath, library=library.parent)
 
 
 def find(objects, override, frame, for_render, waits):

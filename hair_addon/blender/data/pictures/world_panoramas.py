@@ -23,6 +23,12 @@ process_cache = Cache()  # digest → _Rendering: running, or failed
 last_cache = Cache()  # session_uid of a world or light → the last panorama of any of its nodes
 
 
+def library_of(original):
+    """Return the path of the library of a linked datablock, "" for a local one."""
+    library = original.library
+    return "" if library is None else bpy.path.abspath(library.filepath, library=library.parent)
+
+
 class _Rendering:
     """A panorama that another process renders; reason: why it failed, empty otherwise."""
 
@@ -33,10 +39,13 @@ class _Rendering:
         self._folder = tempfile.TemporaryDirectory(prefix=".", dir=path.parent, ignore_cleanup_errors=True)
         folder = Path(self._folder.name)
         blend, self._made = folder / "owner.blend", folder / f"panorama{path.suffix}"
-        words = ["panorama", str(blend), "--out", str(self._made), "--frame", repr(float(frame)), *options]
+        # A .blend contains only links to linked datablocks.
+        words = ["panorama", library_of(owner.original) or str(blend), "--out", str(self._made)]
+        words += ["--frame", repr(float(frame)), "--name", owner.original.name, *options]
         try:
-            bpy.data.libraries.write(str(blend), {owner.original}, path_remap="ABSOLUTE", fake_user=True)
-            unsaved_images.write(folder, [owner.original.node_tree])
+            if owner.original.library is None:
+                bpy.data.libraries.write(str(blend), {owner.original}, path_remap="ABSOLUTE", fake_user=True)
+                unsaved_images.write(folder, [owner.original.node_tree])
             self._process = OtherProcess(words, folder / "errors")
         except (OSError, RuntimeError) as error:
             self._process, self.reason = None, cause_of(error)

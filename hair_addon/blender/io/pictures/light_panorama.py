@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ....core.errors import HairError, cause_of
-from ...data.pictures import shader_sockets
+from ...data.pictures import shader_sockets, unsaved_images
 from ...host import scene_time
 from . import world_panorama
 
@@ -32,6 +32,7 @@ def render(path, name, matrix, frame, out):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         with bpy.data.libraries.load(str(path)) as (_found, wanted):
             wanted.lights = [name]
+        unsaved_images.restore(Path(out).parent)
         scene = bpy.context.scene
         scene.render.engine = "CYCLES"
         (light,) = wanted.lights

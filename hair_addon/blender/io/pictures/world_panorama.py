@@ -19,18 +19,18 @@ SUN_SAMPLES = 16  # per pixel, if a Sky Texture shows the sun: its disk covers t
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
 
 
-def render(path, frame, out):
-    """Render the only world of a .blend at a frame into an .exr. Raises `HairError`.
+def render(path, name, frame, out):
+    """Render a world of a .blend at a frame into an .exr. Raises `HairError`.
 
     The picture is the radiance from all directions, in the projection of the Environment Texture node.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path)) as (found, wanted):
-            wanted.worlds = list(found.worlds)
-        unsaved_images.restore(Path(path).parent)
+        with bpy.data.libraries.load(str(path)) as (_found, wanted):
+            wanted.worlds = [name]
+        unsaved_images.restore(Path(out).parent)
         scene = bpy.context.scene
-        (scene.world,) = wanted.worlds
+        (scene.world,) = filter(None, wanted.worlds)
         scene.render.engine = "CYCLES"
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
