@@ -81,7 +81,7 @@ OTHERS = {
     "data_flow": ("data_flow.svg",),
     "dynamics_settings": ("manual/dynamics_*.png",),
     "cards": ("manual/cards.jpg",),
-    "haircuts": ("manual/haircuts.jpg",),
+    "haircuts": ("manual/haircuts*.jpg",),
     "maps": ("manual/maps.jpg", "manual/more_maps.jpg"),
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),
