@@ -57,8 +57,8 @@ def set_course(hair: Curves, setting: str, curve: str = "") -> None:
     >>> hair = bpy.data.objects["Hair"].data
     >>> style = api.add_style(hair, "CURL")
     >>> api.set_course(hair, "styles.Curl.radius", "0:0 0.3:1 1:0.4")
-    >>> api.maps_of(hair)[0].course
-    '0:0 0.3:1 1:0.4'
+    >>> [one.course for one in api.maps_of(hair) if one.setting == "styles.Curl.radius"]
+    ['0:0 0.3:1 1:0.4']
     >>> api.set_course(hair, "styles.Curl.radius")
     """
     target = _editable(hair, setting)
