@@ -5,7 +5,14 @@
 float channel_dual(vec2 at, float sigma_a)
 {
   float along = (sqrt(sigma_a) - slices.low) / max(slices.high - slices.low, 1e-6);
-  return textureLod(dual_table, vec3(at, between_ends(along, float(textureSize(dual_table, 0).z))), 0.0).r;
+  float texel_count = float(textureSize(dual_table, 0).z);
+  vec2 layer = this_layer();
+  float found = textureLod(dual_table, vec3(at, within_layer(along, texel_count, layer.x)), 0.0).r;
+  if (!HAS_LAYERS) {
+    return found;
+  }
+  float next = textureLod(dual_table, vec3(at, within_layer(along, texel_count, layer.x + 1.0)), 0.0).r;
+  return mix(found, next, layer.y);
 }
 
 vec3 dual(float row, float theta_i)

@@ -8,13 +8,22 @@ float fibre_roughness()
   return this_roughness();
 }
 
+vec4 forward_layer(vec2 at, float sigma_a, float layer)
+{
+  float texel_count = float(textureSize(n_g_slices, 0).z);
+  float slice_count = texel_count / layer_count();
+  vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
+  float first = place.x + slice_count * layer;
+  vec4 below = textureLod(n_g_slices, vec3(at, (first + 0.5) / texel_count), 0.0);
+  vec4 above = textureLod(n_g_slices, vec3(at, (first + 1.5) / texel_count), 0.0);
+  return geometric_mix(below, above, place.y);
+}
+
 vec4 forward_channel(vec2 at, float sigma_a)
 {
-  float slice_count = float(textureSize(n_g_slices, 0).z);
-  vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
-  vec4 below = textureLod(n_g_slices, vec3(at, (place.x + 0.5) / slice_count), 0.0);
-  vec4 above = textureLod(n_g_slices, vec3(at, (place.x + 1.5) / slice_count), 0.0);
-  return geometric_mix(below, above, place.y);
+  vec2 layer = this_layer();
+  vec4 lobes = forward_layer(at, sigma_a, layer.x);
+  return HAS_LAYERS ? mix(lobes, forward_layer(at, sigma_a, layer.x + 1.0), layer.y) : lobes;
 }
 
 FibreLobes forward_lobes(vec2 at)

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.shading.appearance import wet_share
 from ...core.shading.fibre import kajiya_kay, strand_variation
 from ...core.shading.tables import albedo, dual_scattering
+from ...core.shading.tables.radial_tables import RadialTables
 from .programs import scene_programs, uniforms
 
 # Files and tables of the two modes of the Marschner model; the energy-conserving mode evaluates M.
@@ -33,6 +34,7 @@ class Shading:
     reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
     is_mapped: bool = False  # whether strands have looks of their own
+    is_radial: bool = False  # whether their looks differ in radial roughness
     tint: tuple = (1.0, 1.0, 1.0)  # color of all strands, relative to that of the look
     untinted: tuple = ()  # a key of all but the tint: equal for shadings of linked hair that is drawn together
     # For the energy-conserving model: (`lookup_tables.Settings`, `strand_variation.Settings` or None).
@@ -146,24 +148,30 @@ def marschner_strand_shading(tables):
     return replace(shading, fibre=_fibre(tables.settings, tables.variation))
 
 
-def kajiya_kay_look_shading(settings, variation, sigma_a):
-    """Return the `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them."""
+def kajiya_kay_look_shading(settings, variation, sigma_a, is_radial=False):
+    """Return the `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them, which give their
+    colors with the radial roughness of the settings; is_radial: whether strands differ in it.
+    """
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, sigma_a)
     blocks = {"settings": settings, "variation": variation}
-    return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True, is_mapped=True)
+    options = {"is_varied": True, "is_mapped": True, "is_radial": is_radial}
+    return _shading("fibre/kajiya_kay_varied.comp", blocks, {}, forward, **options)
 
 
 def marschner_look_shading(tables):
-    """Return a function of sigma_a (..., 3) of some strands that returns the `Shading` of strands with looks of
-    their own.
+    """Return a function of sigma_a (S, ..., 3), and of the radial roughness (S,) if it varies, of some strands that
+    returns the `Shading` of strands with looks of their own.
 
-    tables: `look_tables.LookTables`; the given strands define the light that strands pass on to others.
+    tables: `look_tables.LookTables` or `radial_tables.RadialTables`; the given strands define the light that strands
+    pass on to others.
     """
-    shading = _shading(*_sliced(tables), np.zeros(3), is_varied=True, is_mapped=True)
+    is_radial = isinstance(tables, RadialTables)
+    file, blocks, arrays = _layered(tables) if is_radial else _sliced(tables)
+    shading = _shading(file, blocks, arrays, np.zeros(3), is_varied=True, is_mapped=True, is_radial=is_radial)
     shading = replace(shading, fibre=_fibre(tables.settings, tables.variation))
 
-    def fitted(sigma_a):
-        forward, reflectance = _deep(tables.settings, *tables.mean_parts(sigma_a))
+    def fitted(sigma_a, *radial):
+        forward, reflectance = _deep(tables.settings, *tables.mean_parts(sigma_a, *radial))
         return replace(shading, forward=forward, reflectance=np.array(reflectance))
 
     return fitted
@@ -184,6 +192,13 @@ def _sliced(tables):
     return file, blocks, arrays
 
 
+def _layered(tables):
+    """Return (file, blocks, tables) of `_shading` for `RadialTables`: the layers one after the other."""
+    (file, blocks, _first), *_others = every = [_sliced(layer) for layer in tables.tables]
+    arrays = {name: np.concatenate([arrays[name] for *_rest, arrays in every]) for name in every[0][2]}
+    return file, blocks | {"layers": tables.layers}, arrays
+
+
 def _fibre(settings, variation):
     return (settings, variation) if settings.mode == "energy" else None
 
@@ -198,20 +213,24 @@ def _deep(settings, forward, backward):
     return 1.0 - attenuation, reflectance
 
 
-def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False, is_mapped=False):
+def _shading(
+    file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False, is_mapped=False, is_radial=False
+):
     """Return the `Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W,
     C)}.
     """
     kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
     if is_varied:
         kinds.append(("strand_looks" if is_mapped else "strand_randoms", "FLOAT_2D"))
+    if is_radial:
+        kinds.append(("strand_radial", "FLOAT_2D"))
     classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
-    wanted = file, classes, tuple(kinds), is_mapped
+    wanted = file, classes, tuple(kinds), is_mapped, is_radial
     program = scene_programs.shading_program(*wanted)
     variant = partial(scene_programs.shading_program, *wanted)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
-    return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied, is_mapped)
+    return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied, is_mapped, is_radial)
 
 
 def _table_texture(array):

@@ -63,6 +63,7 @@ class StrandsOnGPU:
     greatest_radius: float
     randoms_here: np.ndarray | None = None  # (S,) on the CPU; None if all strands are average
     looks: gpu.types.GPUTexture | None = None  # two texels per strand, see fibre/mapped_strand.glsl; None without maps
+    radial: gpu.types.GPUTexture | None = None  # radial roughness in the layout of `randoms`; None if it does not vary
     looks_here: StrandLooks | None = None  # (S,) on the CPU
     moved: Moved | None = None  # None if all points are as uploaded
     is_made: bool = False  # whether the GPU has computed or carried the strands
@@ -73,7 +74,7 @@ class StrandsOnGPU:
     def textures(self) -> list[gpu.types.GPUTexture]:
         """All textures."""
         own = [self.texture, self.radii_texture, self.randoms]
-        own += [one for one in (self.wetness, self.looks) if one is not None]
+        own += [one for one in (self.wetness, self.looks, self.radial) if one is not None]
         return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
@@ -152,7 +153,7 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
 def with_looks(strands, looks):
     """`StrandsOnGPU` with other `StrandLooks`, or with None."""
     if looks is None:
-        return strands if strands.looks is None else replace(strands, looks=None, looks_here=None)
+        return strands if strands.looks is None else replace(strands, looks=None, radial=None, looks_here=None)
     count, row_strands = strands.strand_count, strands.row_strands
     texels = np.zeros((-(-count // row_strands) * row_strands, 2, 4), np.float32)
     for place, sigma_a in enumerate((looks.root, looks.tip)):
@@ -160,7 +161,8 @@ def with_looks(strands, looks):
     np.minimum(looks.roughness, _MOST_HALF, out=texels[:count, 0, 3])
     texels[:count, 1, 3] = 0.5 if strands.randoms_here is None else strands.randoms_here
     texture = driver_textures.new_texture((2 * row_strands, len(texels) // row_strands), "RGBA16F", texels)
-    return replace(strands, looks=texture, looks_here=looks)
+    radial = None if looks.radial is None else numbers_texture(looks.radial, row_strands)
+    return replace(strands, looks=texture, radial=radial, looks_here=looks)
 
 
 def _total_length(points):

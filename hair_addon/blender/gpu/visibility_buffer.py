@@ -434,6 +434,8 @@ class VisibilityBuffer:
             textures, view = dict(shading.samplers), placed.view
             if shading.is_mapped:
                 textures["strand_looks"] = strands.looks
+                if shading.is_radial:
+                    textures["strand_radial"] = strands.radial
             elif shading.is_varied:
                 textures["strand_randoms"] = strands.randoms
             if mix is not None:

@@ -41,16 +41,16 @@ def write_hair_material(curves):
         node = next(nodes, None)
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
-            is_mapped = strand_maps.has(curves)
+            is_mapped, is_radial = strand_maps.has(curves), strand_maps.has_radial(curves)
             if is_mapped or not appearance.strand_settings(look).is_even:
                 curve_data.write_randoms(curves)  # older hair lacks this attribute
             if _has_places(curves):
-                _fill(node, material, properties.dry_look_of(curves.vellus), is_mapped)
+                _fill(node, material, properties.dry_look_of(curves.vellus), is_mapped, is_radial)
                 wettest = wet_nodes.write(material.node_tree, node, shared_wetness.of_hair(curves.vellus))
-                _fill(wettest, material, look, is_mapped)
+                _fill(wettest, material, look, is_mapped, is_radial)
             else:
                 wet_nodes.remove(material.node_tree, node)
-                _fill(node, material, look, is_mapped)
+                _fill(node, material, look, is_mapped, is_radial)
             if is_mapped:
                 _show_mean(material, look, strand_maps.read_looks(curves))
     return errors
@@ -85,7 +85,7 @@ def _shows_another_look(material, curves):
 def _values(curves):
     state = curves.vellus
     values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
-    values["has_looks"] = strand_maps.has(curves)
+    values["has_looks"] = strand_maps.has(curves), strand_maps.has_radial(curves)
     least, most = shared_wetness.of_hair(state)
     return values | {"wetness": (least if curve_data.has_wetness(curves) else most, most)}
 
@@ -105,7 +105,7 @@ def _hair_node(tree):
     tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
 
 
-def _fill(node, material, look, is_mapped=False):
+def _fill(node, material, look, is_mapped=False, is_radial=False):
     color = (*appearance.mean_color(look), 1.0)
     # By identifier: sockets that the node's parametrization disables cannot be looked up by name.
     sockets = {socket.identifier: socket for socket in node.inputs}
@@ -117,5 +117,6 @@ def _fill(node, material, look, is_mapped=False):
     if variation.is_even and not is_mapped:
         strand_nodes.remove(material.node_tree)
     else:
-        varied_color = strand_nodes.write(material.node_tree, node, variation, eevee_nodes.falloff_of(look), is_mapped)
+        falloff = eevee_nodes.falloff_of(look)
+        varied_color = strand_nodes.write(material.node_tree, node, variation, falloff, is_mapped, is_radial)
     eevee_nodes.write(material.node_tree, node, look, varied_color)

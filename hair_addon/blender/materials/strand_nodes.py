@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shader nodes that vary the absorption between and along strands: `strand_variation` in Cycles.
 
-Where maps vary the look, attributes of the hair's Curves have the absorption at root and tip and a factor of the
-roughness, so that linked and exported hair keeps its colors. The strand's random number comes from the same attribute
-as in the viewport; for strands with evenly spaced points, Hair Info's intercept is the viewport's position along the
-strand.
+Where maps vary the look, attributes of the hair's Curves have the absorption at root and tip, a factor of the
+roughness, and the radial roughness if it varies, so that linked and exported hair keeps its colors. The strand's random
+number comes from the same attribute as in the viewport; for strands with evenly spaced points, Hair Info's intercept is
+the viewport's position along the strand.
 """
 
+import itertools
 import math
 
-from ...core.shading.fibre.pigment import LEAST_LIGHT
+from ...core.shading.fibre.pigment import FALLOFF, LEAST_LIGHT, color_falloff
 from ..data.maps import strand_maps
 
 _PREFIX = "Vellus "  # of the names of our nodes, which identifies them
@@ -47,6 +48,13 @@ _MAPPED_NODES = {
     "Tip Part": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (2, 2)),
     **{name: _NODES[name] for name in ("Absorption", "Square Root", "Falloff", "Color")},
 }
+# With looks that differ in radial roughness: Horner's scheme of `color_falloff`, the highest power first.
+_POWERS = [f"Falloff {power}" for power in range(len(FALLOFF) - 2, -1, -1)]
+_RADIAL_NODES = {
+    **_MAPPED_NODES,
+    "Radial Roughness": ("ShaderNodeAttribute", {"attribute_name": strand_maps.RADIAL}, (0, 5)),
+    **{name: ("ShaderNodeMath", {"operation": "MULTIPLY_ADD"}, (2 + column, 5)) for column, name in enumerate(_POWERS)},
+}
 _SPACING = (180.0, -190.0)
 
 # (node, output, node, input); sockets by index where their names repeat.
@@ -77,16 +85,22 @@ _MAPPED_LINKS = (
     ("Tip Part", 0, "Absorption", 1),
     *_LINKS[-3:],
 )
+_RADIAL_LINKS = (
+    *_MAPPED_LINKS,
+    *(("Radial Roughness", "Fac", name, 1) for name in _POWERS),
+    *((name, 0, next_name, 0) for name, next_name in itertools.pairwise(_POWERS)),
+    (_POWERS[-1], 0, "Falloff", "Scale"),
+)
 _SCALED = "Scaled Roughness of "  # nodes that multiply the roughness of a hair node, by the name of it
 
 
-def write(tree, hair_node, variation, falloff, is_mapped=False):
+def write(tree, hair_node, variation, falloff, is_mapped=False, is_radial=False):
     """Vary the absorption of a Principled Hair node; returns the output of a color with this falloff, for EEVEE.
 
-    is_mapped: by the looks that the hair's Curves store.
+    is_mapped: by the looks that the hair's Curves store; is_radial: these looks differ in radial roughness.
     """
     nodes = _ours(tree)
-    graph = (_MAPPED_NODES, _MAPPED_LINKS) if is_mapped else (_NODES, _LINKS)
+    graph = _graph_of(is_mapped, is_radial)
     if {name for name in nodes if not name.startswith(_SCALED)} != set(graph[0]):
         remove(tree)
         nodes = _build(tree, *graph)
@@ -98,6 +112,8 @@ def write(tree, hair_node, variation, falloff, is_mapped=False):
             _input(nodes[name], socket).default_value = value
     if is_mapped:
         _scale_roughness(tree, hair_node, nodes)
+        if is_radial:
+            _vary_radial_roughness(tree, hair_node, nodes, falloff)
     else:
         # Pigment without melanin varies directly, not through its concentration.
         _link(
@@ -109,6 +125,13 @@ def write(tree, hair_node, variation, falloff, is_mapped=False):
     _link(tree, nodes["Absorption"].outputs[0], hair_node, "Absorption Coefficient")
     _link(tree, _output(nodes["Random"], "Fac"), hair_node, "Random")
     return nodes["Color"].outputs[0]
+
+
+def _graph_of(is_mapped, is_radial):
+    """Return (nodes, links)."""
+    if is_mapped and is_radial:
+        return _RADIAL_NODES, _RADIAL_LINKS
+    return (_MAPPED_NODES, _MAPPED_LINKS) if is_mapped else (_NODES, _LINKS)
 
 
 def remove(tree):
@@ -132,6 +155,15 @@ def _scale_roughness(tree, hair_node, nodes):
         tree.links.new(_output(nodes["Roughness"], "Fac"), node.inputs[0])
     node.inputs[1].default_value = _input(hair_node, "Roughness").default_value
     _link(tree, node.outputs[0], hair_node, "Roughness")
+
+
+def _vary_radial_roughness(tree, hair_node, nodes, falloff):
+    """Give a hair node and the falloff of colors the radial roughness of each strand."""
+    _link(tree, _output(nodes["Radial Roughness"], "Fac"), hair_node, "Radial Roughness")
+    part = -falloff / float(color_falloff(_input(hair_node, "Radial Roughness").default_value))
+    nodes[_POWERS[0]].inputs[0].default_value = part * FALLOFF[-1]
+    for name, coefficient in zip(_POWERS, reversed(FALLOFF[:-1]), strict=True):
+        nodes[name].inputs[2].default_value = part * coefficient
 
 
 def _build(tree, wanted, links):

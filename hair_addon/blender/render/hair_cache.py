@@ -17,7 +17,7 @@ from ...core.files import table_cache, table_exr
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance, strand_looks
 from ...core.shading.strand_looks import StrandLooks
-from ...core.shading.tables import look_tables, lookup_tables, strand_tables
+from ...core.shading.tables import look_tables, lookup_tables, radial_tables, strand_tables
 from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, posed_strands, simulated_guides, stored_roots
 from ..gpu import hair_shading, strand_textures
@@ -408,15 +408,25 @@ def _shading_of_looks(state, look, variation, looks):
     """Return the `Shading` of strands with `StrandLooks`."""
     some = strand_looks.sample_sigma_a(look, looks)
     if state.model == "KAJIYA_KAY":
-        settings = appearance.kajiya_kay_strand_settings(look)
-        return hair_shading.kajiya_kay_look_shading(settings, variation, some)
+        settings, is_radial = appearance.kajiya_kay_strand_settings(look), looks.radial is not None
+        some = strand_looks.even_sigma_a(look, looks.some, some)
+        return hair_shading.kajiya_kay_look_shading(settings, variation, some, is_radial)
     settings = replace(properties.table_settings_of(state, look), sigma_a=(0.0, 0.0, 0.0))
     covered = look_tables.covering(*looks.absorption_range)
-    return _cached_shading((settings, variation, covered), _look_shading)(some)
+    if looks.radial_range is None or settings.mode != "energy":  # the classic model has no radial roughness
+        return _cached_shading((settings, variation, covered), _look_shading)(some)
+    layers = radial_tables.covering(*looks.radial_range)
+    settings = replace(settings, radial_roughness=layers.low)
+    return _cached_shading((settings, variation, covered, layers), _radial_shading)(some, looks.some.radial)
 
 
 def _look_shading(settings, variation, covered):
     return hair_shading.marschner_look_shading(look_tables.bake(settings, variation, covered, preferences.device()))
+
+
+def _radial_shading(settings, variation, covered, layers):
+    baked = radial_tables.bake(settings, variation, covered, layers, preferences.device())
+    return hair_shading.marschner_look_shading(baked)
 
 
 def _strand_shading(settings, variation):

@@ -157,6 +157,7 @@ def _strands_of(strands, shading, to_world, first):
         first + is_wettest,
         to_world,
         (id(strands), id(shading)),
+        None if looks is None else looks.radial,
     )
 
 

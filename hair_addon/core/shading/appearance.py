@@ -97,7 +97,7 @@ class Appearance(Settings):
     )
     absorption: tuple = param_of(marschner.Settings, "sigma_a", (0.245531, 0.52, 1.365))
     roughness: float = param_of(marschner.Settings, "roughness", may_vary=True)
-    radial_roughness: float = param_of(marschner.Settings, "radial_roughness")
+    radial_roughness: float = param_of(marschner.Settings, "radial_roughness", may_vary=True)
     coat: float = param_of(marschner.Settings, "coat")
     ior: float = param_of(marschner.Settings, "eta")
     cuticle_angle: float = param_of(marschner.Settings, "tilt", math.radians(2.0))

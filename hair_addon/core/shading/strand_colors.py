@@ -7,7 +7,7 @@ from . import appearance
 from .appearance import Appearance
 from .fibre import principled, strand_variation
 from .fibre.pigment import color_from_sigma_a
-from .strand_looks import StrandLooks, gradient_of, roughness_of
+from .strand_looks import StrandLooks, colors_of, gradient_of, roughness_of
 
 
 def colors(
@@ -20,7 +20,7 @@ def colors(
     """
     if strand_looks is not None:
         sigma_a = strand_looks.sigma_a(gradient_of(look, np.linspace(0.0, 1.0, point_count))[None])
-        return color_from_sigma_a(sigma_a, look.radial_roughness).astype(np.float32)
+        return colors_of(look, strand_looks, sigma_a).astype(np.float32)
     differing, position = _variation(look, np.asarray(randoms), np.linspace(0.0, 1.0, point_count))
     return np.broadcast_to(_colors(look, differing[:, None], position[None]), (len(randoms), point_count, 3))
 
@@ -34,7 +34,7 @@ def colors_at(
     """
     if strand_looks is not None:
         sigma_a = strand_looks.sigma_a(gradient_of(look, np.asarray(positions)))
-        return color_from_sigma_a(sigma_a, look.radial_roughness).astype(np.float32)
+        return colors_of(look, strand_looks, sigma_a).astype(np.float32)
     differing, position = _variation(look, np.asarray(randoms), np.asarray(positions))
     return np.broadcast_to(_colors(look, differing, position), (len(positions), 3))
 

@@ -101,27 +101,35 @@ def test_nodes_compute_the_strands_absorption(patch, tmp_path, name):
 
 
 def test_nodes_compute_the_looks_of_maps(patch, tmp_path):
-    """Cycles shows the absorption that maps give each strand, from root to tip, and the factor of its roughness."""
+    """Cycles shows the absorption that maps give each strand, from root to tip, and its roughness; EEVEE its color."""
     look = Appearance(tip_absorption=0.4, random_color=0.5, gradient_start=0.2, roughness=0.4)
     random = np.linspace(0.0, 1.0, STRAND_COUNT)
     varied = {"melanin": np.linspace(0.1, 0.9, STRAND_COUNT), "roughness": np.linspace(0.1, 0.9, STRAND_COUNT)}
+    varied["radial_roughness"] = np.linspace(0.9, 0.1, STRAND_COUNT)
     looks = strand_looks.strand_looks(look, varied, random)
-    kinds = ("FLOAT_VECTOR", "FLOAT_VECTOR", "FLOAT")
-    names = (strand_maps.ROOT, strand_maps.TIP, strand_maps.ROUGHNESS)
-    for name, kind, values in zip(names, kinds, (looks.root, looks.tip, looks.roughness), strict=True):
+    kinds = ("FLOAT_VECTOR", "FLOAT_VECTOR", "FLOAT", "FLOAT")
+    names = (strand_maps.ROOT, strand_maps.TIP, strand_maps.ROUGHNESS, strand_maps.RADIAL)
+    every = looks.root, looks.tip, looks.roughness, looks.radial
+    for name, kind, values in zip(names, kinds, every, strict=True):
         attributes.write(patch.data, name, kind, "CURVE", values)
     assert strand_maps.read_looks(patch.data).is_same(looks)
     material, node = varied_material(look)
     node.inputs["Roughness"].default_value = look.roughness
-    strand_nodes.write(material.node_tree, node, appearance.strand_settings(look), 1.0, is_mapped=True)
+    variation, falloff = appearance.strand_settings(look), appearance.kajiya_kay_strand_settings(look).falloff
+    color = strand_nodes.write(material.node_tree, node, variation, falloff, is_mapped=True, is_radial=True)
     patch.data.materials.append(material)
     socket = emission_of(material)
     position = (np.arange(16 * HEIGHT) + 0.5) / (16 * HEIGHT)
     sigma_a = looks.sigma_a(strand_looks.gradient_of(look, position)[None]).transpose(1, 0, 2)
     expected = sigma_a.reshape(HEIGHT, 16, STRAND_COUNT, 3).mean(axis=1)
     rough = varied["roughness"][None, :, None]
-    for name, wanted in (("Absorption Coefficient", expected), ("Roughness", rough)):
-        material.node_tree.links.new(node.inputs[name].links[0].from_socket, socket)
+    radial = varied["radial_roughness"][None, :, None]
+    colors = strand_looks.colors_of(look, looks, looks.sigma_a(strand_looks.gradient_of(look, position)[None]))
+    colors = colors.transpose(1, 0, 2).reshape(HEIGHT, 16, STRAND_COUNT, 3).mean(axis=1)
+    sources = [node.inputs[name].links[0].from_socket for name in ("Absorption Coefficient", "Roughness")]
+    sources += [node.inputs["Radial Roughness"].links[0].from_socket, color]
+    for source, wanted in zip(sources, (expected, rough, radial, colors), strict=True):
+        material.node_tree.links.new(source, socket)
         found = render(tmp_path)
         np.testing.assert_allclose(found, np.broadcast_to(wanted, found.shape), rtol=5e-3, atol=2e-3 * wanted.max())
 

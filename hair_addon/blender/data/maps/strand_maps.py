@@ -13,7 +13,8 @@ from ...settings import map_items, properties, shared_wetness
 from ..strands import attributes
 from . import ramps, sources
 
-ROOT, TIP, ROUGHNESS = "root_absorption", "tip_absorption", "strand_roughness"  # attributes of the hair's Curves
+# Attributes of the hair's Curves; the last is absent if the radial roughness does not vary.
+ROOT, TIP, ROUGHNESS, RADIAL = "root_absorption", "tip_absorption", "strand_roughness", "strand_radial_roughness"
 _LAYOUT = ((ROOT, "FLOAT_VECTOR"), (TIP, "FLOAT_VECTOR"), (ROUGHNESS, "FLOAT"))
 
 
@@ -67,15 +68,29 @@ def write_looks(hair) -> list[HairError]:
         if has(hair):
             for name, _data_type in _LAYOUT:
                 hair.attributes.remove(hair.attributes[name])
+        _write_radial(hair, None)
         return errors
     for (name, data_type), values in zip(_LAYOUT, (looks.root, looks.tip, looks.roughness), strict=True):
         attributes.write(hair, name, data_type, "CURVE", values)
+    _write_radial(hair, looks.radial)
     return errors
+
+
+def _write_radial(hair, values):
+    if values is not None:
+        attributes.write(hair, RADIAL, "FLOAT", "CURVE", values)
+    elif has_radial(hair):
+        hair.attributes.remove(hair.attributes[RADIAL])
 
 
 def has(hair) -> bool:
     """Whether Curves, possibly evaluated or linked, store looks of strands."""
     return all(attributes.has(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT)
+
+
+def has_radial(hair) -> bool:
+    """Whether Curves, possibly evaluated or linked, store a radial roughness for each strand."""
+    return attributes.has(hair, RADIAL, "FLOAT", "CURVE")
 
 
 def read_looks(hair) -> StrandLooks | None:
@@ -85,4 +100,8 @@ def read_looks(hair) -> StrandLooks | None:
     if not has(hair):
         return None
     found = [attributes.read(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT]
-    return StrandLooks(*(np.clip(np.where(np.isfinite(values), values, 0.0), 0.0, 1e3) for values in found))
+    radial = attributes.read(hair, RADIAL, "FLOAT", "CURVE") if has_radial(hair) else None
+    return StrandLooks(
+        *(np.clip(np.where(np.isfinite(values), values, 0.0), 0.0, 1e3) for values in found),
+        None if radial is None else np.clip(np.where(np.isfinite(radial), radial, 0.0), 0.0, 1.0),
+    )

@@ -172,12 +172,21 @@ SAMPLES_OF_THREAD = 8  # SAMPLES_OF_THREAD of shaders/visibility/strand_samples.
 
 @cached
 def shading_program(
-    file, blocks=(), tables=(), is_mapped=False, in_parts=False, is_mixed=False, is_solid=False, is_batch=False
+    file,
+    blocks=(),
+    tables=(),
+    is_mapped=False,
+    is_radial=False,
+    in_parts=False,
+    is_mixed=False,
+    is_solid=False,
+    is_batch=False,
 ):
     """Return the compute program that shades strands with a model's .comp.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; is_mapped: each strand has a look of its
-    own, in the sampler of fibre/mapped_strand.glsl; in_parts: draw a part of the light,
+    own, in the sampler of fibre/mapped_strand.glsl; is_radial: also a radial roughness of its own, in the sampler of
+    fibre/strand_radial.glsl; in_parts: draw a part of the light,
     selected by the constants of fibre/drawn_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
     of fibre/mixed_looks.glsl; is_solid: for Solid shading, by the block of fibre/solid_light.glsl; is_batch: of linked
     hair objects.
@@ -195,6 +204,9 @@ def shading_program(
     if is_mapped:
         replaced["fibre/varied_strand.glsl"] = "fibre/mapped_strand.glsl"
         replaced["fibre/dual_along.glsl"] = "fibre/dual_of_strand.glsl"
+    if is_radial:
+        replaced["fibre/one_layer.glsl"] = "fibre/radial_layers.glsl"
+        replaced["fibre/look_falloff.glsl"] = "fibre/strand_falloff.glsl"
     if is_solid:
         replaced["fibre/shown_light.glsl"] = "fibre/solid_light.glsl"
         info.uniform_buf(2 + len(structs), uniforms.SOLID.type_name, "solid")

@@ -15,6 +15,9 @@ PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
 FITTED_IOR = 1.55  # of the fibers to which [Chiang16] fitted colors
 
+# Coefficients of `color_falloff` by powers of the azimuthal roughness [Chiang16].
+FALLOFF = (5.969, -0.215, 2.532, -10.73, 5.574, 0.245)
+
 # Transmittance of full melanin: zero would need infinite absorption.
 LEAST_LIGHT = 1e-4
 
@@ -32,8 +35,12 @@ def sigma_a_from_melanin(melanin: Values, redness: Values) -> np.ndarray:
 
 def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
     """Return sigma_a (..., 3) of the fibers of a groom with a color, linear RGB (..., 3) [Chiang16]."""
-    color = np.clip(color, _DARKEST, _BRIGHTEST)
-    return np.square(np.log(color) / color_falloff(azimuthal_roughness))
+    return sigma_a_of_falloff(color, color_falloff(azimuthal_roughness))
+
+
+def sigma_a_of_falloff(color: ArrayLike, falloff: Values) -> np.ndarray:
+    """Return sigma_a (..., 3) of a groom with a color (..., 3) by the `color_falloff` of its azimuthal roughness."""
+    return np.square(np.log(np.clip(color, _DARKEST, _BRIGHTEST)) / falloff)
 
 
 def color_from_sigma_a(sigma_a: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
@@ -59,4 +66,4 @@ def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
 
 def color_falloff(roughness: Values) -> np.ndarray:
     """Return the decrease of ln(color) with sqrt(sigma_a): the fit of [Chiang16] to path-traced grooms."""
-    return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])
+    return np.polynomial.polynomial.polyval(roughness, FALLOFF)

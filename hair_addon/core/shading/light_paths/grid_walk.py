@@ -38,6 +38,7 @@ class Medium:
     sigma_a: wp.array[wp.vec3]
     strands: wp.array[int]
     roughness: wp.array[float]
+    scales: wp.array[float]  # of the azimuthal logistic of each strand [rad]
     fibres: wp.array[int]
     fibre_rows: wp.array2d[float]
     mesh: wp.uint64
@@ -73,10 +74,10 @@ def fibre_of(medium: Medium, segment: int):
     fibre.sigma_a = 0.5 * (medium.sigma_a[segment] + medium.sigma_a[segment + 1])
     fibre.roughness = medium.roughness[strand]
     fibre.eta = medium.fibre_rows[row, 0]
-    fibre.scale = medium.fibre_rows[row, 1]
-    fibre.tilt = medium.fibre_rows[row, 2]
-    fibre.tilt_trt = medium.fibre_rows[row, 3]
-    fibre.coat = medium.fibre_rows[row, 4]
+    fibre.scale = medium.scales[strand]
+    fibre.tilt = medium.fibre_rows[row, 1]
+    fibre.tilt_trt = medium.fibre_rows[row, 2]
+    fibre.coat = medium.fibre_rows[row, 3]
     return fibre
 
 

@@ -79,7 +79,7 @@ def medium_of(
     )
     medium.points, medium.sigma_a, medium.radii = grid.points, grid.sigma_a, grid.radii
     medium.strands, medium.roughness, medium.fibres = grid.strands, grid.roughness, grid.fibres
-    medium.fibre_rows = grid.fibre_rows
+    medium.scales, medium.fibre_rows = grid.scales, grid.fibre_rows
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
     medium.normals, medium.albedo, medium.gloss = (vectors(values) for values in (normals, albedo, gloss))
     medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)

@@ -38,7 +38,7 @@ class Strands:
     absorption: function of indices of strands (N,) → sigma_a (N, 2, 3), or (1, 2, 3) if all strands are equal, at root
     and tip; gradient: (P,) fraction of the tip's absorption at each point; fibre: (S,) index of each strand's settings
     among the settings given to `build`; kind: equal for systems with the same strands and look, whose light is summed
-    together; None if the light of the system has its own sums.
+    together; None if the light of the system has its own sums; radial: None for the settings' radial roughness.
     """
 
     points: np.ndarray  # (S, P, 3)
@@ -49,6 +49,7 @@ class Strands:
     fibre: np.ndarray  # (S,)
     to_world: np.ndarray = field(default_factory=lambda: np.eye(4))  # (4, 4) of points, to [m]
     kind: Hashable | None = None
+    radial: np.ndarray | None = None  # (S,)
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,10 @@ class StrandGrid:
     sigma_a: wp.array[wp.vec3]  # (N,)
     strands: wp.array[int]  # (N,): the strand of each point
     roughness: wp.array[float]  # (S,)
+    scales: wp.array[float]  # (S,): of the azimuthal logistic [rad]
     fibres: wp.array[int]  # (S,): rows of `fibre_rows`
     sums: wp.array[int]  # (S,): the index of the sums that the light of each strand is added to
-    fibre_rows: wp.array2d[float]  # (F, 5): ior, azimuthal scale, tilt, shift of TRT in tilts, coat
+    fibre_rows: wp.array2d[float]  # (F, 4): ior, tilt, shift of TRT in tilts, coat
     thinned: tuple[Thinned, ...]  # of each system
     sums_of_systems: tuple[int, ...]  # the index of the sums of each system: the same for linked hair
 
@@ -117,6 +119,8 @@ def build(
         require_count("radii", strands.radii.size, strands.points.shape[0] * strands.points.shape[1])
         require_count("places of a gradient", len(strands.gradient), strands.points.shape[1])
         require_count("values of roughness", len(strands.roughness), len(strands.points))
+        if strands.radial is not None:
+            require_count("values of radial roughness", len(strands.radial), len(strands.points))
         require_count("fibers", len(strands.fibre), len(strands.points))
         require_indices("fibers", strands.fibre, len(fibres))
     share = segment_count / max(sum(strands.radii[:, 1:].size for strands in systems), 1)
@@ -142,6 +146,7 @@ def build(
         cells = strand_cells.build(points, radii, strand_of_points, widest, voxels, along_voxel)
         strided = [(strands, one.stride) for strands, one in zip(systems, thinned, strict=True)]
         roughness = np.concatenate([strands.roughness[::stride] for strands, stride in strided])
+        scales = np.concatenate([_scales(strands, fibres)[::stride] for strands, stride in strided])
         fibre = np.concatenate([strands.fibre[::stride] for strands, stride in strided])
         return StrandGrid(
             *voxels,
@@ -151,9 +156,10 @@ def build(
             sigma_a,
             strand_of_points,
             wp.array(roughness.astype(np.float32), dtype=float),
+            wp.array(scales.astype(np.float32), dtype=float),
             wp.array(fibre.astype(np.int32), dtype=int),
             wp.array(np.repeat(np.array(sums_of_systems, np.int32), counts), dtype=int),
-            wp.array(np.array([_fibre_row(settings) for settings in fibres], np.float32).reshape(-1, 5), dtype=float),
+            wp.array(np.array([_fibre_row(settings) for settings in fibres], np.float32).reshape(-1, 4), dtype=float),
             tuple(thinned),
             sums_of_systems,
         )
@@ -306,5 +312,11 @@ def _voxels(low, high, radius, voxel_count):
 
 def _fibre_row(settings):
     tilt_trt = 4.0 if settings.shifts == "CYCLES" else 3.0
-    scale = float(scale_from_radial_roughness(settings.radial_roughness))
-    return settings.eta, scale, settings.tilt, tilt_trt, settings.coat
+    return settings.eta, settings.tilt, tilt_trt, settings.coat
+
+
+def _scales(strands, fibres):
+    """Return the scales (S,) of the azimuthal logistic."""
+    if strands.radial is not None:
+        return scale_from_radial_roughness(strands.radial.astype(float))
+    return np.array([float(scale_from_radial_roughness(each.radial_roughness)) for each in fibres])[strands.fibre]

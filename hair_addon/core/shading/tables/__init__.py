@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         dual_scattering,
         look_tables,
         lookup_tables,
+        radial_tables,
         strand_tables,
         surface_albedo,
         table_axes,

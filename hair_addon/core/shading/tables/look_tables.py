@@ -36,11 +36,15 @@ class LookTables:
         """The fiber's settings."""
         return self.slices.settings
 
-    def mean_parts(self, sigma_a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the fractions (3,) scattered forward and backward, means over strands with sigma_a (..., 3)."""
-        sigma_a = sigma_a.reshape(-1, 3)
+    def mean_parts(self, sigma_a: np.ndarray, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the fractions (3,) scattered forward and backward, means over strands with sigma_a (S, ..., 3).
+
+        weights: (S,) of the strands.
+        """
+        each = sigma_a.reshape(len(sigma_a), -1, 3)
         forward, backward = (
-            strand_tables.at_absorptions(part, self.slices, sigma_a).mean(axis=0) for part in self.parts
+            np.average(strand_tables.at_absorptions(part, self.slices, each).mean(axis=1), axis=0, weights=weights)
+            for part in self.parts
         )
         return forward, backward
 

@@ -95,6 +95,26 @@ def test_numbers_are_factors(hair):
     np.testing.assert_allclose([rough.min(), rough.max()], [0.5, 2.0], rtol=1e-6)
 
 
+def test_radial_roughness_varies(coat):
+    """A map gives each strand its own radial roughness, and its color the absorption for it; removed, nothing stays."""
+    look = coat.vellus.appearance
+    look.color, look.radial_roughness = RED, 0.25
+    group = bpy.data.objects["Sphere"].vertex_groups["top"]
+    looks = vary(coat, "look.radial_roughness", kind="GROUP", source=group.name, low=1.0, high=3.0)
+    np.testing.assert_allclose([looks.radial.min(), looks.radial.max()], [0.25, 0.75], rtol=1e-6)
+    for value in (0.25, 0.75):
+        even = appearance.Appearance(parametrization="COLOR", color=tuple(look.color), radial_roughness=value)
+        own = looks.root[looks.radial == value]
+        assert len(own)
+        np.testing.assert_allclose(own, np.tile(appearance.sigma_a(even), (len(own), 1)), rtol=1e-6)
+    assert "Vellus Radial Roughness" in coat.materials[0].node_tree.nodes
+    map_items.remove(coat.vellus, "look.radial_roughness")
+    bpy.context.view_layer.update()
+    assert strand_maps.read_looks(coat) is None and not strand_maps.has_radial(coat)
+    looks = vary(coat, "look.roughness", kind="STRAND")
+    assert looks.radial is None and "Vellus Radial Roughness" not in coat.materials[0].node_tree.nodes
+
+
 def test_random_colors_differ_by_place(hair):
     """Where a map of *Random Color* is 0 or 1, strands have the colors of a groom with the value at From or To."""
     sphere, curves = bpy.data.objects["Sphere"], hair.data
@@ -215,6 +235,26 @@ def test_a_constant_map_draws_the_constant(lit, model, mode):
     state.appearance.color = RED
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(picture(), plain)
+
+
+@pytest.mark.parametrize(
+    ("model", "mode"),
+    [
+        ("MARSCHNER", "energy"),
+        *(pytest.param(*each, marks=pytest.mark.long) for each in (("KAJIYA_KAY", "energy"), ("MARSCHNER", "classic"))),
+    ],
+)
+def test_a_constant_map_of_the_radial_roughness_draws_the_constant(lit, model, mode):
+    """Hair whose map gives one radial roughness is drawn as hair with this setting, within 1.5/255."""
+    state = lit.data.vellus
+    state.marschner.size, state.hair.radius = 32, 0.02
+    state.model, state.appearance.mode, state.appearance.parametrization = model, mode, "COLOR"
+    state.appearance.color, state.appearance.radial_roughness = RED, 0.6
+    bpy.context.view_layer.update()
+    plain = picture()
+    state.appearance.radial_roughness = 0.25
+    vary(lit.data, "look.radial_roughness", kind="STRAND", low=2.4, high=2.4)
+    np.testing.assert_allclose(picture(), plain, atol=1.5 / 255.0)
 
 
 def test_a_map_is_set_by_panel_script_and_command_line(coat):

@@ -37,7 +37,7 @@ def level_view(middle, along, up, size, depth):
 ALONG_Y = level_view((0.0, -4.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (2.0, 2.0), 8.0)
 
 
-def grid_of(points, sigma_a, radius=0.004, settings=None, **details):
+def grid_of(points, sigma_a, radius=0.004, settings=None, radial=None, **details):
     count, settings = len(points), settings or lookup_tables.Settings(mode="energy")
     strands = strand_grid.Strands(
         points.astype(np.float32),
@@ -46,6 +46,7 @@ def grid_of(points, sigma_a, radius=0.004, settings=None, **details):
         np.zeros(points.shape[1]),
         np.full(count, settings.roughness),
         np.zeros(count, int),
+        radial=radial,
     )
     return strand_grid.build([strands], [settings], **details)
 
@@ -105,6 +106,20 @@ def test_paths_are_the_same_again(rng):
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     first, again = (found_by(grid, light, ALONG_Y, 20_000) for _ in range(2))
     np.testing.assert_array_equal(first, again)
+
+
+def test_strands_scatter_by_their_own_radial_roughness(rng):
+    """Strands with a radial roughness of their own find, bit for bit, the light of settings with this roughness."""
+    points, light = strands_in_a_box(rng, 300), surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
+    settings = lookup_tables.Settings(mode="energy", radial_roughness=0.8)
+    grids = [
+        grid_of(points, (0.1, 0.3, 1.0), settings=settings, voxel_count=625),
+        grid_of(points, (0.1, 0.3, 1.0), radial=np.full(300, 0.8), voxel_count=625),
+        grid_of(points, (0.1, 0.3, 1.0), voxel_count=625),
+    ]
+    wanted, own, other = (found_by(grid, light, ALONG_Y, 5_000) for grid in grids)
+    np.testing.assert_array_equal(own, wanted)
+    assert not np.array_equal(other, wanted)
 
 
 def test_what_ends_at_a_pause_leaves_sums_as_they_are(rng):
