@@ -37,7 +37,7 @@ ROWS = tuple(
 )
 LOOKS = (
     ("Ponytail", (TAIL,), {"shape": "PONYTAIL"}),
-    ("Bun", ((BACK, (0.0, 0.06, 0.82)),), {"shape": "BUN", "bun_radius": 0.036, "tail_radius": 0.014}),
+    ("Bun", ((BACK, (0.0, 0.06, 0.82)),), {"shape": "BUN", "bun_radius": 0.036}),
     ("Braids", BRAIDS, {"shape": "BRAID", "tail_radius": 0.015, "tie_radius": 0.009, "pitch": 0.06}),
     ("Rope, Tightness 0.4", (TAIL,), {"shape": "ROPE", "tail_radius": 0.016, "pitch": 0.09, "tightness": 0.4}),
     (

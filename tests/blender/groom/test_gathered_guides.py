@@ -55,7 +55,8 @@ def test_guides_are_gathered_outside_of_the_surface(guides, shape):
     assert gather(guides, shape=shape) == len(before)
     after = points(guides)
     assert np.array_equal(after[:, 0], before[:, 0])
-    np.testing.assert_allclose(segments(after), segments(before), rtol=0.01)
+    if shape != "BUN":  # whose guides become as long as its coil
+        np.testing.assert_allclose(segments(after), segments(before), rtol=0.01)
     assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.993
     is_long = np.linalg.norm(before[:, 0] - LINE[0], axis=1) < 1.6
     tips = after[is_long, -1]

@@ -61,41 +61,62 @@ def test_distances_on_a_plane_are_exact_and_on_a_sphere_within_three_percent(bal
     np.testing.assert_allclose(spread, arcs, rtol=0.03, atol=0.004)
 
 
-@pytest.mark.parametrize("shape", ["PONYTAIL", "BRAID", "ROPE", "BUN"])
+@pytest.mark.parametrize("shape", ["PONYTAIL", "BRAID", "ROPE"])
 def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
     guides = guides_on(80)
     after, groups, _held = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
-    assert (groups == 1).all() if shape in ("PONYTAIL", "BUN") else len(np.unique(groups)) > 1
+    assert (groups == 1).all() if shape == "PONYTAIL" else len(np.unique(groups)) > 1
     assert groups.min() == 1
     np.testing.assert_array_equal(after[:, 0], guides[:, 0])
     np.testing.assert_allclose(segments(after), segments(guides), rtol=1e-4)
     lifted = TIE * (1.0 + SETTINGS.clearance / RADIUS)
     assert from_tie(after, lifted).max() < 2.0 * SETTINGS.tie_radius
-    assert (
-        np.linalg.norm(after, axis=2).min() > (0.9 if shape == "BUN" else 0.97) * RADIUS
-    )  # coils are pushed out later
-    if shape == "BUN":
-        middle = TIE * (1.0 + (SETTINGS.clearance + SETTINGS.bun_radius) / RADIUS)
-        is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
-        tips = np.linalg.norm(after[is_near, -1] - middle, axis=1)
-        assert tips.max() < 1.5 * SETTINGS.bun_radius
-    else:
-        is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
-        assert after[is_near, -1, 2].max() < TIE[2]  # where the line leads
+    assert np.linalg.norm(after, axis=2).min() > 0.97 * RADIUS
+    is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
+    assert after[is_near, -1, 2].max() < TIE[2]  # where the line leads
 
 
-def test_hair_of_any_length_stays_in_a_bun_and_becomes_equally_long(ball):
+BUN = replace(SETTINGS, shape="BUN", bun_radius=0.03)
+IN_BUN = 23  # points of a guide of 31
+
+
+def test_hair_of_any_length_is_coiled_in_a_bun_with_its_ends_inside(ball):
     guides = guides_on(80)
     whole = LENGTH * np.linspace(0.9, 1.5, 80)
     guides = guides[:, :1] + (guides - guides[:, :1]) * (whole / LENGTH)[:, None, None]
-    settings = replace(SETTINGS, shape="BUN", bun_radius=0.03)
-    after, _groups, _held = gathered(ball, guides.astype(np.float32), [TAIL], settings)
-    middle = TIE * (1.0 + (settings.clearance + settings.bun_radius) / RADIUS)
-    tie = TIE * (1.0 + settings.clearance / RADIUS)
-    at_tie = np.linalg.norm(after - tie, axis=2).argmin(axis=1)
-    is_behind = np.arange(after.shape[1]) > at_tie[:, None]
-    assert np.linalg.norm(after - middle, axis=2)[is_behind].max() < 1.15 * settings.bun_radius
-    np.testing.assert_allclose(segments(after).sum(axis=1), np.median(whole), rtol=1e-4)
+    after, groups, _held = gathered(ball, guides.astype(np.float32), [TAIL], BUN)
+    assert (groups == 1).all()
+    np.testing.assert_array_equal(after[:, 0], guides[:, 0])
+    assert from_tie(after, TIE * (1.0 + BUN.clearance / RADIUS)).max() < 1.1 * BUN.tie_radius
+    up = TIE / RADIUS
+    coiled = after[:, -IN_BUN:] - TIE
+    above = coiled @ up
+    beside = np.linalg.norm(coiled - above[..., None] * up, axis=2)
+    assert beside.max() < 1.02 * BUN.bun_radius and above.max() < 1.2 * BUN.bun_radius
+    assert np.linalg.norm(after, axis=2).min() > 0.97 * RADIUS
+    turned = np.unwrap(np.arctan2(coiled[..., 0], coiled @ np.cross([1.0, 0.0, 0.0], up)), axis=1)
+    assert np.abs(turned[:, -1] - turned[:, 6]).min() > 2.0 * np.pi * 0.6 * BUN.turns
+    # The ends are below the coil.
+    assert beside[:, -1].max() < 0.75 * BUN.bun_radius and above[:, -1].max() < 0.5 * BUN.bun_radius
+    assert beside[:, -1].max() < 0.9 * beside.max(axis=1).min()
+
+
+def test_means_of_guides_are_as_long_as_the_coil_of_a_bun(ball):
+    """Strands between guides are lengthened to the mean of the guides' lengths, and stay in the bun if it is theirs."""
+    after, _groups, _held = gathered(ball, guides_on(80), [TAIL], BUN)
+    coiled = np.diff(after[:, -IN_BUN:].astype(np.float64), axis=1)
+    near = np.argsort(np.linalg.norm(after[:, None, 0] - after[None, :, 0], axis=2), axis=1)[:, :4]
+    means = np.linalg.norm(coiled[near].mean(axis=1), axis=2)
+    lengths = np.linalg.norm(coiled, axis=2)[near].mean(axis=1)
+    assert np.quantile(means / lengths, 0.05) > 0.9
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+@pytest.mark.parametrize("turns", [0.01, 100.0])
+def test_buns_of_few_points_and_of_any_turns_stay_in_their_ball(ball, count, turns):
+    guides = guides_on(20)[:, np.linspace(0, 30, count).astype(int)]
+    after, _groups, _held = gathered(ball, guides, [TAIL], replace(BUN, turns=turns))
+    assert np.linalg.norm(after[:, 2:] - TIE, axis=2).max(initial=0.0) < 1.5 * BUN.bun_radius
 
 
 def test_symmetric_guides_stay_symmetric(ball):
@@ -105,10 +126,11 @@ def test_symmetric_guides_stay_symmetric(ball):
     assert np.quantile(np.linalg.norm(mirrored - after[40:], axis=2), 0.95) < 0.01
 
 
-def test_a_tie_that_moves_by_a_millimeter_moves_no_point_far(ball):
+@pytest.mark.parametrize("settings", [SETTINGS, BUN])
+def test_a_tie_that_moves_by_a_millimeter_moves_no_point_far(ball, settings):
     guides = guides_on(80)
-    after, _groups, _held = gathered(ball, guides, [TAIL], SETTINGS)
-    moved, _groups, _held = gathered(ball, guides, [TAIL + np.array([0.001, 0.0, 0.0])], SETTINGS)
+    after, _groups, _held = gathered(ball, guides, [TAIL], settings)
+    moved, _groups, _held = gathered(ball, guides, [TAIL + np.array([0.001, 0.0, 0.0])], settings)
     assert np.linalg.norm(moved - after, axis=2).max() < 0.01
 
 
@@ -123,15 +145,16 @@ def test_guides_go_to_the_nearest_of_several_ties(ball):
 def test_short_guides_end_on_their_way_and_other_parts_stay(ball):
     guides = guides_on(80)
     short = guides[:, :1] + 0.05 * (guides - guides[:, :1])
-    after, _groups, _held = gathered(ball, short, [TAIL], SETTINGS)
-    np.testing.assert_allclose(segments(after), segments(short), rtol=1e-3)
-    assert np.linalg.norm(after, axis=2).max() < RADIUS + 4.0 * SETTINGS.tie_radius
+    after, _groups, _held = gathered(ball, short, [TAIL], BUN)
+    is_far = np.linalg.norm(guides[:, 0] - TIE, axis=1) > 0.05
+    np.testing.assert_allclose(segments(after)[is_far], segments(short)[is_far], rtol=1e-3)
+    assert np.linalg.norm(after[is_far], axis=2).max() < RADIUS + 4.0 * SETTINGS.tie_radius
     apart = TriMesh(
         np.concatenate([ball.vertices, ball.vertices + np.float32([1.0, 0.0, 0.0])]),
         np.concatenate([ball.triangles, ball.triangles + len(ball.vertices)]),
     )
     both = np.concatenate([guides, guides + np.float32([1.0, 0.0, 0.0])])
-    after, groups, _held = gathered(apart, both, [TAIL], SETTINGS)
+    after, groups, _held = gathered(apart, both, [TAIL], BUN)
     assert (groups[:80] > 0).all() and not groups[80:].any()
     np.testing.assert_array_equal(after[80:], both[80:])
 

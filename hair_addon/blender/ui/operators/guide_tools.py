@@ -233,7 +233,7 @@ _ROWS_OF_SHAPES = {
     "BRAID": ("tie_radius", "tail_radius", "pitch"),
     "ROPE": ("tie_radius", "tail_radius", "pitch"),
     "CORNROWS": ("tie_radius", "pitch"),
-    "BUN": ("tie_radius", "tail_radius", "bun_radius", "turns"),
+    "BUN": ("tie_radius", "bun_radius", "turns"),
 }
 
 

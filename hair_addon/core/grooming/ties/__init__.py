@@ -7,6 +7,7 @@ from ...lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
+        buns,
         cornrows,
         gather_settings,
         gathering,

@@ -4,8 +4,7 @@
 The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height
 grows toward the tie, because it lies on the hair of all roots that it passes: by the area of this hair divided by the
 circumference. Each guide keeps its angle around the tie, and its distance determines its place in the disk of the tie,
-by equal areas. Segments keep their lengths; guides that are too short end before the tie. In a bun, guides that reach
-the tie become equally long: neighbors are wound by equal angles, and the strands between them stay in the ball.
+by equal areas. Segments keep their lengths, except in buns; guides that are too short end before the tie.
 """
 
 from collections.abc import Sequence
@@ -21,7 +20,7 @@ from ...geometry.mesh import TriMesh
 from ...kernels import parallel
 from ...kernels.parallel import Rows
 from ..guide_shapes import joined, split, unit
-from . import cornrows, tie_tails
+from . import buns, cornrows, tie_tails
 from .gather_settings import GatherSettings
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
@@ -88,35 +87,53 @@ def _field(mesh, query, line, settings):
 
 def _at_line(mesh, query, points, line, field, settings):
     """Return the guides (S, P, 3) that one line gathers, their locks (S,), and the lengths (S,) up to the tie [m]."""
-    lengths = split(points)[1]
-    reach = float(lengths.sum(axis=1).max())
+    reach = float(split(points)[1].sum(axis=1).max())
     ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
     order = np.argsort(np.argsort(apart[:, 0], kind="stable"))
     ranks = (order + 0.5) / len(order)
     ways += _heights(apart, settings)[..., None] * normals
+    if settings.shape == "BUN":
+        return _in_bun(mesh, query, points, (ways, ranks), line, settings)
     if settings.shape == "CORNROWS":
         braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
         behind, locks, left = cornrows.ways_along(ways, ranks, braid, reach, settings)
         ends = _lengths(np.concatenate([ways, behind[:, :1]], axis=1)) + left
     else:
         ends = _lengths(ways)
-        if settings.shape == "BUN":
-            lengths, ends = _evened(lengths, ends), np.full(len(ways), np.inf)
         behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
-    turn = ways.shape[1] if settings.shape == "BUN" else None
-    ways = np.concatenate([ways, behind], axis=1)
+    return _along(points, np.concatenate([ways, behind], axis=1)), locks, ends
+
+
+def _along(points, ways):
+    """Return guides (S, P, 3) along ways (S, K, 3), with the roots and the lengths of the segments of points."""
     ways[:, 0] = points[:, 0]
-    return joined(points, split(_walked(ways, lengths, turn))[0], lengths), locks, ends
+    lengths = split(points)[1]
+    return joined(points, split(_walked(ways, lengths))[0], lengths)
 
 
-def _evened(lengths, ends):
-    """Return lengths (S, P-1) [m] of segments: guides that are longer than `ends` (S,) [m] get their median length."""
-    whole = lengths.sum(axis=1)
-    is_long = whole > ends
-    if not is_long.any():
-        return lengths
-    common = np.maximum(np.median(whole[is_long]), ends)
-    return np.where(is_long[:, None], lengths * (common / np.maximum(whole, 1e-30))[:, None], lengths)
+def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
+    """Return the result of `_at_line` for a bun: guides that are long enough for the tie become as long as its coil."""
+    ways, ranks = ways_and_ranks
+    bun = buns.wound(mesh, query, line, settings)
+    normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
+    on_way, coiled = buns.segment_counts(points.shape[1] - 1)
+    wound = bun.points(_angles(ways, bun.line, normal), ranks, coiled + 1)
+    ways = np.concatenate([ways, wound[:, :1]], axis=1)
+    after = _along(points, ways)
+    is_long = split(points)[1].sum(axis=1) > _lengths(ways)
+    evenly = _evenly(ways[is_long], on_way + 1)
+    after[is_long] = np.concatenate([evenly, wound[is_long, 1:]], axis=1)
+    return after, np.zeros(len(ways), int), np.full(len(ways), np.inf)
+
+
+def _evenly(ways, count):
+    """Return (S, count, 3) points at equal distances along ways (S, K, 3), from their first point to their last."""
+    along = np.concatenate([np.zeros((len(ways), 1)), np.linalg.norm(np.diff(ways, axis=1), axis=2).cumsum(axis=1)], 1)
+    found = np.empty((len(ways), count, 3))
+    for row, (lengths, way) in enumerate(zip(along, ways, strict=True)):
+        places = np.linspace(0.0, lengths[-1], count)
+        found[row] = np.stack([np.interp(places, lengths, axis) for axis in way.T], axis=1)
+    return found
 
 
 def _lengths(ways):
@@ -129,7 +146,7 @@ def _behind_tie(mesh, query, ways, ranks, line, reach, settings):
     tie = query.nearest(line[:1])
     tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
     angles = _angles(ways, tail, mesh_math.normals(mesh, tie)[0])
-    along = np.linspace(0.0, tie_tails.extent(reach, settings), _TAIL_POINTS)
+    along = np.linspace(0.0, reach, _TAIL_POINTS)
     along = np.broadcast_to(along, (len(ways), _TAIL_POINTS))
     centers, sides, ups = tail.at(along)
     locks = tie_tails.locks_at(angles, settings)
@@ -198,37 +215,26 @@ def _angles(ways, tail, normal):
     return np.arctan2(turned @ tail.ups[0], turned @ tail.sides[0])
 
 
-def _walked(ways, lengths, turn):
+def _walked(ways, lengths):
     """Return (S, P, 3) float32: points on ways (S, K, 3), as far apart as segments (S, P-1) are long.
 
-    At the end of their ways, guides go straight on, or back to the point `turn` and forth again.
+    At the end of their ways, guides go straight on.
     """
     middle = ways.mean(axis=(0, 1))
     shared = [np.ascontiguousarray(ways - middle, np.float32), np.ascontiguousarray(lengths, np.float32)]
-    last = ways.shape[1] - 1
     out = parallel.empty_vectors((len(ways), lengths.shape[1] + 1), "cpu")
     inputs = [
         Rows(wp.array(shared[0], dtype=wp.vec3, device="cpu", copy=False)),
         Rows(wp.array(shared[1], dtype=float, device="cpu", copy=False)),
-        last if turn is None else min(turn, last),
     ]
     parallel.launch(_walk, len(ways), inputs, [out], "cpu", least_rows=256)
     return (out.numpy() + middle).astype(np.float32)
-
-
-@wp.func
-def _back_and_forth(place: int, turn: int, last: int) -> int:
-    """Return the point of a way at a place of the walk to its last point, back to `turn`, and forth again."""
-    if place <= last:
-        return place
-    return last - wp.abs((place - turn) % (2 * (last - turn)) - (last - turn))
 
 
 @wp.kernel
 def _walk(
     ways: wp.array2d[wp.vec3],
     lengths: wp.array2d[float],
-    turn: int,
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
@@ -240,18 +246,13 @@ def _walk(
     onward = wp.vec3(0.0, 0.0, 0.0)
     for i in range(lengths.shape[1]):
         length = lengths[guide, i]
-        end = last
-        if turn < last:
-            end = segment + 2 * last
-        ahead = ways[guide, _back_and_forth(wp.min(segment + 1, end), turn, last)]
-        while segment < end and wp.length(ahead - place) < length:
+        while segment < last and wp.length(ways[guide, segment + 1] - place) < length:
             segment += 1
-            ahead = ways[guide, _back_and_forth(wp.min(segment + 1, end), turn, last)]
-        if segment < end:
+        if segment < last:
             # The place between two points of the way that is one length away.
-            behind = ways[guide, _back_and_forth(segment, turn, last)]
+            behind = ways[guide, segment]
             start = behind - place
-            step = ahead - behind
+            step = ways[guide, segment + 1] - behind
             a = wp.dot(step, step)
             b = wp.dot(start, step)
             c = wp.dot(start, start) - length * length
@@ -260,7 +261,7 @@ def _walk(
                 t = wp.clamp((wp.sqrt(wp.max(b * b - a * c, 0.0)) - b) / a, 0.0, 1.0)
             target = behind + t * step
         else:
-            target = ahead
+            target = ways[guide, last]
             if wp.length(onward) > 0.0:
                 target = place + length * onward
         if wp.length(target - place) > 0.0:

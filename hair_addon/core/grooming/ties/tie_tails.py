@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way of gathered hair behind its tie: along a drawn line, as one tail, a rope or a braid, or wound into a bun.
+"""The way of gathered hair behind its tie: along a drawn line, as one tail, a rope or a braid.
 
 Hair keeps its place in the disk of the tie, in frames that are carried along the line by least rotations [Bishop75].
 """
@@ -13,9 +13,6 @@ from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
 LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
-_INNER = 0.75  # radius of every other layer of a bun, relative to the outer ones
-_WOUND = 2.0  # length of a bun's way relative to its hair, whose segments cut the way's curves
-_MOST_LAYERS = 24  # of a bun
 _TAPER = 0.35  # radius of the tail's end, relative to its widest place
 
 
@@ -41,7 +38,7 @@ class TailLine:
 
 
 def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: GatherSettings) -> TailLine:
-    """Return the `TailLine` of a drawn line (K, 3) [m] that begins at its tie, or of the bun there.
+    """Return the `TailLine` of a drawn line (K, 3) [m] that begins at its tie.
 
     normal: (3,) unit, of the surface at the tie; reach: length [m] of the longest hair, by which the line is
     continued straight at its end.
@@ -50,11 +47,15 @@ def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: Gath
     start = unit(line[1] - line[0])
     normal = np.asarray(normal, np.float64)
     across = float(np.linalg.norm(np.cross(start, normal)))
-    if settings.shape == "BUN":
-        points = _bun(line[0] + settings.clearance * normal, start, normal, reach, settings)
-    else:
-        shifted = line + (settings.clearance + settings.tie_radius * across) * normal
-        points = np.concatenate([shifted, shifted[-1:] + (reach + 1e-6) * unit(shifted[-1:] - shifted[-2:-1])])
+    shifted = line + (settings.clearance + settings.tie_radius * across) * normal
+    points = np.concatenate([shifted, shifted[-1:] + (reach + 1e-6) * unit(shifted[-1:] - shifted[-2:-1])])
+    return framed(points, normal, reach)
+
+
+def framed(points: np.ndarray, normal: np.ndarray, reach: float) -> TailLine:
+    """Return a `TailLine` through points (K, 3) [m], with rounded corners; normal: (3,) unit, of the surface at the
+    tie.
+    """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     lengths = np.concatenate([[0.0], np.cumsum(steps)])
     along = np.linspace(0.0, lengths[-1], _SAMPLES)
@@ -68,11 +69,6 @@ def tail_line(line: np.ndarray, normal: np.ndarray, reach: float, settings: Gath
         up = unit(up - tangent * (up @ tangent))
         ups[place] = up
     return TailLine(along, centers, unit(np.cross(tangents, ups)), ups, max(reach, 1e-9))
-
-
-def extent(reach: float, settings: GatherSettings) -> float:
-    """Return the greatest length [m] of line that hair of a length `reach` occupies."""
-    return reach * (_WOUND if settings.shape == "BUN" else 1.0)
 
 
 def locks_at(angles: np.ndarray, settings: GatherSettings) -> np.ndarray:
@@ -109,37 +105,15 @@ def offsets(
     else:  # three locks that cross in turn over and under the middle
         centers, size = np.stack([0.62 * np.sin(phase), 0.36 * np.sin(2.0 * phase)], axis=-1), 0.4
     braided = radius[..., None] * (centers + size * own[:, None])
-    share = _ease(along / (0.5 * settings.pitch))[..., None]
+    share = ease(along / (0.5 * settings.pitch))[..., None]
     return gathered + share * (braided - gathered)
 
 
 def _radius(line, along, settings):
     """Return the radius (...) [m] of a tail: the tie's at the start, then the tail's, smaller at the end."""
     part = along / line.reach
-    grown = settings.tie_radius + _ease(part / 0.25) * (settings.tail_radius - settings.tie_radius)
-    return grown if settings.shape == "BUN" else grown * (1.0 - (1.0 - _TAPER) * _ease((part - 0.5) / 0.5))
-
-
-def _bun(tie, start, normal, reach, settings):
-    """Return points (M, 3) of spirals back and forth on a ball on the surface; every second spiral is inside."""
-    side = start - normal * (start @ normal)
-    side = unit(side) if np.linalg.norm(side) > 0.1 else unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
-    other = np.cross(normal, side)
-    outer = settings.bun_radius - settings.tail_radius
-    middle = tie + settings.bun_radius * normal
-    outer = max(outer, 0.3 * settings.bun_radius)
-    points, length, layer, turned = [tie], 0.0, 0, 0.0
-    while length < _WOUND * reach and layer < _MOST_LAYERS:
-        size = outer if layer % 2 == 0 else _INNER * outer
-        part = np.linspace(0.0, 1.0, 64)
-        polar = np.pi * (0.1 + 0.75 * (part if layer % 2 == 0 else 1.0 - part))
-        turn = turned + 2.0 * np.pi * settings.turns * part
-        ring = np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * other
-        wound = middle + size * (np.sin(polar)[:, None] * ring - np.cos(polar)[:, None] * normal)
-        points += [*wound]
-        length += float(np.linalg.norm(np.diff(wound, axis=0), axis=1).sum())
-        layer, turned = layer + 1, turn[-1]
-    return np.array(points)
+    grown = settings.tie_radius + ease(part / 0.25) * (settings.tail_radius - settings.tie_radius)
+    return grown * (1.0 - (1.0 - _TAPER) * ease((part - 0.5) / 0.5))
 
 
 def _smooth(centers):
@@ -149,6 +123,7 @@ def _smooth(centers):
     return centers
 
 
-def _ease(part):
+def ease(part: np.ndarray) -> np.ndarray:
+    """Return the smoothstep of numbers, which are clipped to [0, 1]."""
     part = np.clip(part, 0.0, 1.0)
     return part * part * (3.0 - 2.0 * part)
