@@ -206,6 +206,7 @@ def resized(middle):
     x, y = (int(value) for value in middle)
     window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
     yield
+    done["radius before"] = brush.radius / max(of_kind("GUIDES").data.surface.dimensions)
     take_picture(OUT / "brush.png", redraws=2)
     for name, shift in (("radius", False), ("strength", True)):
         yield from key("F", shift=shift)

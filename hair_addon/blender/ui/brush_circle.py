@@ -12,8 +12,19 @@ _COLOR = (1.0, 1.0, 1.0, 0.8)
 _WIDTH = 1.5  # [pixels]
 
 
+# Where the circle stays while moving the mouse changes the brush, in the window [pixels]; None for at the mouse.
+_held = None
+
+
+def hold(place):
+    """Keep the circle at a place (2,) in the window [pixels]; None lets it follow the mouse again."""
+    global _held
+    _held = place
+
+
 def draw(context, brush, xy):
     """Draw the brush's circle at the mouse xy in the window [pixels]; brush: the properties of `vellus.paint_flow`."""
+    xy = _held or xy
     region, view, guides = context.region, context.region_data, guides_of(context.object)
     if region is None or view is None or guides is None or guides.surface is None:
         return
@@ -25,12 +36,10 @@ def draw(context, brush, xy):
 
 def circle(context, guides, brush, mouse):
     """Return points (N, 3) of a brush's circle in world coordinates, for the mouse in the region [pixels], or None."""
-    is_set = brush.is_property_set("radius")
-    radius = brush.radius if is_set else flow_painting.default_radius(guides) or brush.radius
     origin = view3d_utils.region_2d_to_origin_3d(context.region, context.region_data, mouse)
     direction = view3d_utils.region_2d_to_vector_3d(context.region, context.region_data, mouse)
     # Drawing does not update the evaluated scene.
-    return flow_painting.brush_circle(guides.surface, origin, direction, radius, context.view_layer.depsgraph)
+    return flow_painting.brush_circle(guides.surface, origin, direction, brush.radius, context.view_layer.depsgraph)
 
 
 def in_window(points, region, view):

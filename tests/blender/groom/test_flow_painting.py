@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector
 from hair_addon import api
 from hair_addon.blender.groom.guides import flow_painting
 from hair_addon.blender.ui import brush_circle, tools
-from hair_addon.blender.ui.operators.flow_painting import VELLUS_OT_paint_flow
+from hair_addon.blender.ui.operators.flow_painting import VELLUS_OT_paint_flow, VELLUS_OT_size_flow_brush
 from hair_addon.core.errors import HairError
 from tests.support.interface.layout import draw, redo_panel
 from tests.support.reading import evaluated_points, points
@@ -180,6 +180,53 @@ def test_the_circle_of_the_brush_lies_on_the_surface(guides, place):
     outward = np.array(surface.matrix_world.inverted().transposed().to_3x3() @ normal)
     np.testing.assert_allclose(from_middle @ outward / np.linalg.norm(outward), 0.0, atol=2e-2)
     assert flow_painting.brush_circle(surface, above, above - middle, 0.7, depsgraph) is None
+
+
+def test_the_brush_fits_the_surface_until_its_radius_is_set(guides):
+    """The header, which shows the properties of the tool, and the circle have one radius before the first stroke."""
+    brush = bpy.context.window_manager.operator_properties_last("vellus.paint_flow")
+    brush.property_unset("radius")
+    fitted = flow_painting.default_radius(guides.data)
+    assert brush.radius == pytest.approx(fitted) and not brush.is_property_set("radius") and fitted > 0.1
+    bpy.data.objects["Sphere"].scale = (0.01, 0.01, 0.01)
+    bpy.context.view_layer.update()
+    assert brush.radius == pytest.approx(0.01 * fitted)
+    brush.radius = 0.3
+    assert brush.radius == pytest.approx(0.3)
+    brush.property_unset("radius")
+
+
+def test_the_circle_stays_while_its_radius_changes(guides, monkeypatch):
+    """F keeps the circle where it began and returns the mouse there, whether the change is kept or canceled."""
+    drawn, warps = [], []
+    monkeypatch.setattr(brush_circle, "circle", lambda _context, _guides, _brush, mouse: drawn.append(mouse))
+    brush = SimpleNamespace(radius=0.5)
+    tool = SimpleNamespace(idname=tools.PAINT_FLOW, operator_properties=lambda _name: brush)
+    context = SimpleNamespace(
+        region=SimpleNamespace(x=20, y=10),
+        region_data=True,
+        object=guides,
+        mode="OBJECT",
+        area=SimpleNamespace(tag_redraw=lambda: None),
+        window=SimpleNamespace(cursor_warp=lambda *place: warps.append(place)),
+        window_manager=SimpleNamespace(modal_handler_add=lambda _operator: None),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        workspace=SimpleNamespace(tools=SimpleNamespace(from_space_view3d_mode=lambda _mode: tool)),
+    )
+
+    def event(kind, x, value="PRESS"):
+        return SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=100)
+
+    for last, radius in (("LEFTMOUSE", 1.0), ("ESC", 1.0)):
+        operator = SimpleNamespace(setting="radius")
+        operator._end = lambda *given, me=operator: VELLUS_OT_size_flow_brush._end(me, *given)
+        VELLUS_OT_size_flow_brush.invoke(operator, context, event("F", 200))
+        VELLUS_OT_size_flow_brush.modal(operator, context, event("MOUSEMOVE", 350, "NOTHING"))
+        brush_circle.draw(context, brush, (350, 100))
+        VELLUS_OT_size_flow_brush.modal(operator, context, event(last, 350))
+        assert drawn.pop() == (180, 90) and warps.pop() == (200, 100) and brush.radius == radius
+        brush_circle.draw(context, brush, (350, 100))
+        assert drawn.pop() == (330, 90)
 
 
 def test_the_circle_is_drawn_where_the_view_shows_it():

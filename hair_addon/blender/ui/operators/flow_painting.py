@@ -12,12 +12,25 @@ from ...groom.selection import guides_of
 from ...host.notices import name_of
 from ...settings import setting_properties, strokes
 from ...settings.translations import CONTEXT
+from .. import brush_circle
 from .guide_tools import GuideTool
 
 _TOOL = "vellus.paint_flow"
 _SPACING = 0.05  # least distance between points of a stroke, relative to the radius
 _OCTAVE = 150.0  # movement of the mouse that doubles the radius [pixels]
 _RANGE = 300.0  # movement of the mouse from no strength to full strength [pixels]
+
+
+def _fitted_radius(_operator, value, is_set):
+    """Return the radius that the header, the redo panel and strokes show: one that fits the surface until it is set."""
+    guides = None if is_set else guides_of(getattr(bpy.context, "object", None))
+    return value if guides is None else flow_painting.default_radius(guides) or value
+
+
+def _annotations():
+    found = setting_properties.annotations(FlowSettings)
+    radius = bpy.props.FloatProperty(**found["radius"].keywords, get_transform=_fitted_radius)
+    return found | {"radius": radius} | strokes.annotations()
 
 
 class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
@@ -27,12 +40,7 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
     bl_label = "Paint Flow"
     bl_options = {"REGISTER", "UNDO", "BLOCKING"}
     Settings = FlowSettings
-    __annotations__ = setting_properties.annotations(FlowSettings) | strokes.annotations()
-
-    def prefill(self, guides):
-        radius = flow_painting.default_radius(guides)
-        if radius and not self.properties.is_property_set("radius"):
-            self.radius = radius
+    __annotations__ = _annotations()
 
     def invoke(self, context, event):
         """Begin a stroke where the mouse is pressed on the surface; elsewhere Blender handles the event."""
@@ -43,10 +51,10 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
         place = self._place_of(context, event)
         if place is None:
             return {"PASS_THROUGH"}
-        self.prefill(guides)
+        self.radius = radius = self.radius  # stored, so that the redo panel repeats the stroke with it
         tool = _active_tool(context)
         if tool is not None:
-            tool.operator_properties(_TOOL).radius = self.radius  # shown in the header
+            tool.operator_properties(_TOOL).radius = radius
         self.stroke.clear()
         try:
             with memory_as_sentence():
@@ -121,11 +129,8 @@ class VELLUS_OT_size_flow_brush(bpy.types.Operator):
     def invoke(self, context, event):
         """Begin with the present value."""
         brush = _active_tool(context).operator_properties(_TOOL)
-        guides = guides_of(context.object)
-        radius = None if guides is None else flow_painting.default_radius(guides)
-        if radius and not brush.is_property_set("radius"):
-            brush.radius = radius
-        self._brush, self._before, self._start = brush, getattr(brush, self.setting), event.mouse_x
+        self._brush, self._before, self._start = brush, getattr(brush, self.setting), (event.mouse_x, event.mouse_y)
+        brush_circle.hold(self._start)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -136,14 +141,21 @@ class VELLUS_OT_size_flow_brush(bpy.types.Operator):
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"} and event.value == "PRESS":
             return self._end(context, getattr(self._brush, self.setting), {"FINISHED"})
         if event.type == "MOUSEMOVE":
-            moved = (event.mouse_x - self._start) / context.preferences.system.ui_scale
+            moved = (event.mouse_x - self._start[0]) / context.preferences.system.ui_scale
             is_radius = self.setting == "radius"
             value = self._before * 2.0 ** (moved / _OCTAVE) if is_radius else self._before + moved / _RANGE
             setattr(self._brush, self.setting, value)
             context.area.tag_redraw()  # the circle, and the header with the value
         return {"RUNNING_MODAL"}
 
+    def cancel(self, _context):
+        """Restore the value when the window is closed."""
+        brush_circle.hold(None)
+        setattr(self._brush, self.setting, self._before)
+
     def _end(self, context, value, result):
+        brush_circle.hold(None)
+        context.window.cursor_warp(*self._start)  # back to the circle
         setattr(self._brush, self.setting, value)
         context.area.tag_redraw()
         return result
