@@ -70,6 +70,7 @@ def test_flow_is_painted_by_the_mouse(walk):
     assert flow["in the stroke"][0] > 0.05 and flow["is the same at once"] < 1e-5
     assert flow["radius"] == pytest.approx(1.0)
     brush = walk.facts["brush"]
+    assert brush["radius before"] == pytest.approx(0.12)  # fits the surface before the first stroke
     assert brush["radius moved"] > 0.0 and brush["radius changed"] == brush["radius moved"]
     assert brush["strength moved"] > 0.0 and brush["strength changed"] == 0.0
     assert flow["without strength"] and flow["is undone"] and flow["is canceled"] and not flow["second stroke"]

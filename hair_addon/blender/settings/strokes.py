@@ -4,6 +4,8 @@
 import bpy
 import numpy as np
 
+from ...core.grooming.guide_tool_settings import FlowSettings
+from . import setting_properties
 from .translations import CONTEXT
 
 
@@ -13,10 +15,21 @@ class VellusStrokePoint(bpy.types.PropertyGroup):
     location: bpy.props.FloatVectorProperty(options={"HIDDEN"})
 
 
-def annotations():
-    """Return {name: bpy property} of an operator with a stroke on a surface."""
+def annotations(fitted_radius):
+    """Return {name: bpy property} of an operator with a stroke of a brush on a surface.
+
+    fitted_radius: a function that returns the radius [m] until it is set, or None.
+    """
+
+    def radius_of(_operator, value, is_set):
+        return value if is_set else fitted_radius() or value
+
     options = {"HIDDEN", "SKIP_SAVE"}
-    return {"stroke": bpy.props.CollectionProperty(type=VellusStrokePoint, options=options)}
+    radius = setting_properties.annotations(FlowSettings)["radius"].keywords
+    return {
+        "stroke": bpy.props.CollectionProperty(type=VellusStrokePoint, options=options),
+        "radius": bpy.props.FloatProperty(**radius, get_transform=radius_of),
+    }
 
 
 def read(operator):

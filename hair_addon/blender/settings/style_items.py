@@ -10,6 +10,7 @@ import bpy
 
 from ...core.errors import HairError
 from ...core.params import declared
+from ...core.styling import fitting
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
 from ..host.notices import text_of
 from . import map_items, setting_properties, style_keys
@@ -52,6 +53,10 @@ class VellusStyle(bpy.types.PropertyGroup):
         "kind": bpy.props.EnumProperty(
             items=[(kind, LABELS[kind], DESCRIPTIONS[kind]) for kind in KINDS], options={"HIDDEN"}
         ),
+        # Of a preset whose locks were enlarged, as there were few strands; zero without.
+        "lock_wanted": bpy.props.FloatProperty(options={"HIDDEN"}),
+        "lock_enlarged": bpy.props.FloatProperty(options={"HIDDEN"}),
+        "lock_strands": bpy.props.IntProperty(options={"HIDDEN"}),
         **{kind.lower(): bpy.props.PointerProperty(type=_GROUPS[kind]) for kind in KINDS},
     }
 
@@ -67,6 +72,25 @@ def group_of(item):
 def settings_of(item):
     """Return the `StyleSettings` of an item. Raises `HairError`."""
     return setting_properties.to_settings(group_of(item), KINDS[item.kind])
+
+
+def note_enlarged(item, wanted, enlarged, strand_count):
+    """Note that locks of a wanted size [m] were enlarged for a number of strands."""
+    is_enlarged = enlarged > wanted
+    item.lock_wanted, item.lock_enlarged = (wanted, enlarged) if is_enlarged else (0.0, 0.0)
+    item.lock_strands = strand_count if is_enlarged else 0
+
+
+def enlarged_of(item):
+    """Return (wanted size [m], enlarged size [m], number of strands) of locks that still have their enlarged size.
+
+    None for other styles.
+    """
+    if not item.lock_enlarged > 0.0:
+        return None
+    size = fitting.lock_size(settings_of(item))
+    is_same = abs(size - item.lock_enlarged) <= 1e-4 * size
+    return (item.lock_wanted, item.lock_enlarged, item.lock_strands) if is_same else None
 
 
 def styles_of(state):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fitting of settings for a human scalp to another surface: all lengths are multiplied by one factor."""
 
+import math
 from collections.abc import Collection
 from dataclasses import fields, replace
 from typing import Any, TypeVar
@@ -29,6 +30,20 @@ def fitted(settings: S, factor: float, strand_spacing: float = 0.0, kept: Collec
     if lock is not None and getattr(settings, lock) < _FEWEST_SPACINGS * strand_spacing:
         settings = replace(settings, **{lock: _rounded(_FEWEST_SPACINGS * strand_spacing)})
     return replace(settings, **given) if given else settings
+
+
+def lock_size(settings: StyleSettings) -> float:
+    """Return the size of a style's locks [m]; 0 for a style without locks."""
+    name = _LOCKS.get(type(settings))
+    return 0.0 if name is None else getattr(settings, name)
+
+
+def lock_size_for(wanted: float, enlarged: float, former_count: int, count: int) -> float:
+    """Return the size [m] that wanted locks need with `count` strands.
+
+    enlarged: the size [m] that they need with `former_count` strands; the spacing of strands determines it.
+    """
+    return max(wanted, _rounded(enlarged * math.sqrt(former_count / max(count, 1))))
 
 
 def fitted_value(value: Any, details: Param, factor: float) -> Any:

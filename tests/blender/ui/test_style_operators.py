@@ -19,7 +19,7 @@ from hair_addon.core.files import style_presets
 from hair_addon.core.geometry import strands
 from hair_addon.core.grooming import groom_defaults
 from hair_addon.core.params import declared
-from hair_addon.core.styling import clump, clump_trees, curl, frizz, lean, trim, wet
+from hair_addon.core.styling import clump, clump_trees, curl, fitting, frizz, lean, trim, wet
 from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.interface.layout import draw, draw_all
@@ -211,6 +211,28 @@ def test_presets_fit_the_surface(hair):
     assert factor == pytest.approx(SPHERE_FACTOR, rel=0.02)
     assert spacing == pytest.approx(math.sqrt(4.0 * math.pi / 500), rel=0.02)
     assert locks.size == pytest.approx(4.0 * spacing, rel=0.01)
+
+
+def test_locks_of_presets_for_few_strands_are_explained(hair):
+    """The panel names the size that was wanted; with more strands, the size that the preset then gives."""
+    hair.data.vellus.hair.strand_count = 40
+    operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
+    item = next(item for item in state().styles if item.kind == "CLUMP")
+    enlarged = item.clump.size
+    (reported,) = style_notes.notes_of(hair.data, item)
+    state().active_style = list(state().styles).index(item)
+    assert reported.startswith("For so few strands") and reported in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
+    hair.data.vellus.hair.strand_count = 400
+    (reported,) = style_notes.notes_of(hair.data, item)
+    assert reported.startswith("The strands are denser now")
+    fitted = fitting.lock_size_for(*style_items.enlarged_of(item), 400)
+    item.clump.size = 0.9 * enlarged  # an artist's own size
+    assert style_notes.notes_of(hair.data, item) == []
+    operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
+    item = next(item for item in state().styles if item.kind == "CLUMP")
+    assert item.clump.size == pytest.approx(fitted, rel=5e-3) and fitted < 0.5 * enlarged
+    operate(bpy.ops.vellus.apply_style_preset, preset="CURLY", is_fitted=False)
+    assert not any(map(style_items.enlarged_of, state().styles))
 
 
 def test_a_preset_may_come_after_the_present_styles(styled):

@@ -41,14 +41,18 @@ def adding(
     """
     curves.require_editable(hair)
     style_items.require_room(len(hair.vellus.styles) + 1)
+    wanted = settings
     if is_fitted:
-        settings = fitting.fitted(settings, *surface_fit(hair), kept)
+        factor, spacing = surface_fit(hair)
+        wanted = fitting.fitted(settings, factor, kept=kept)
+        settings = fitting.fitted(settings, factor, spacing, kept)
     if "seed" not in kept:
         settings = replace(settings, seed=style_items.new_seed(hair.vellus))
     place = Remembered(hair)
     yield _placing_locks(hair, [settings])
     state = _found(place).vellus
     style_items.add(state, settings, name)
+    _note_locks(hair, state.styles[-1:], [wanted])
     return style_items.settings_of(style_items.active_of(state))
 
 
@@ -82,8 +86,10 @@ def applying_preset(
     is_fitted: as in `adding`; keeps_styles: add the preset's styles after the present ones. Raises `HairError` before
     any change.
     """
+    unenlarged = preset
     if is_fitted:
-        preset = style_presets.fit(preset, *surface_fit(hair))
+        factor, spacing = surface_fit(hair)
+        unenlarged, preset = (style_presets.fit(preset, factor, distance) for distance in (0.0, spacing))
     present = groom_settings.settings_of(hair)
     wanted = preset.changed(present)
     if keeps_styles and preset.styles is not None:
@@ -92,7 +98,17 @@ def applying_preset(
         wanted = replace(wanted, styles=(*present.styles, *added), style_names=tuple(names))
     place = Remembered(hair)
     yield _placing_locks(hair, wanted.styles)
-    groom_settings.apply_settings(_found(place), wanted)
+    hair = _found(place)
+    groom_settings.apply_settings(hair, wanted)
+    if preset.styles:
+        _note_locks(hair, hair.vellus.styles[-len(preset.styles) :], unenlarged.styles or ())
+
+
+def _note_locks(hair, items, wanted):
+    """Note on items which locks of wanted styles were enlarged for the number of strands."""
+    for item, style in zip(items, wanted, strict=True):
+        enlarged = fitting.lock_size(style_items.settings_of(item))
+        style_items.note_enlarged(item, fitting.lock_size(style), enlarged, hair.vellus.hair.strand_count)
 
 
 def _found(place: Remembered) -> Curves:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import bpy
 from bpy.types import Curves, PropertyGroup
 
-from ....core.styling import clump_trees, program
+from ....core.styling import clump_trees, fitting, program
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
 from ...data.strands import curves
@@ -27,12 +27,20 @@ _WITHOUT = {
     "TRIM": ("random", "to_length", "undercoat", "cutter"),
 }
 
+_NEARLY = 0.9  # part of the size of locks; smaller changes are not worth a note
+
 _OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
 
 
 def notes_of(hair: Curves, item: PropertyGroup) -> list[str]:
     """Return translated sentences about a style of a hair Curves datablock; item: the style's properties."""
-    return [*_without_effect(item), *_missing_data(hair, item), *_too_small(hair, item), *_order(hair, item)]
+    return [
+        *_without_effect(item),
+        *_missing_data(hair, item),
+        *_too_small(hair, item),
+        *_enlarged(hair, item),
+        *_order(hair, item),
+    ]
 
 
 def _without_effect(item: PropertyGroup) -> Iterator[str]:
@@ -89,9 +97,26 @@ def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     finest = min(used.variants or (tree,), key=lambda each: min(each.sizes))
     factor = clump_trees.size_factor(styling.trees.area, finest)
     if factor > 1.0:
-        units = bpy.context.scene.unit_settings.system
-        size = bpy.utils.units.to_string(units, "LENGTH", factor * finest.sizes[0], precision=3)
+        size = _shown(factor * finest.sizes[0])
         yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
+
+
+def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    """Yield a note on locks of a preset that were enlarged, as there were few strands."""
+    known = style_items.enlarged_of(item)
+    if known is None:
+        return
+    fitting_now = fitting.lock_size_for(*known, hair.vellus.hair.strand_count)
+    sizes = dict(zip(("wanted", "size", "fitting"), map(_shown, (*known[:2], fitting_now)), strict=True))
+    if fitting_now > _NEARLY * known[1]:
+        yield interface_text("For so few strands, locks have a size of {size} instead of {wanted}.", **sizes)
+    else:
+        yield interface_text("The strands are denser now: a size of {fitting} fits them.", **sizes)
+
+
+def _shown(length):
+    """Return a length [m] as text in the scene's units."""
+    return bpy.utils.units.to_string(bpy.context.scene.unit_settings.system, "LENGTH", length, precision=3)
 
 
 def _order(hair: Curves, item: PropertyGroup) -> Iterator[str]:

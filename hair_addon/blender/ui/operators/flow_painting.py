@@ -21,16 +21,10 @@ _OCTAVE = 150.0  # movement of the mouse that doubles the radius [pixels]
 _RANGE = 300.0  # movement of the mouse from no strength to full strength [pixels]
 
 
-def _fitted_radius(_operator, value, is_set):
-    """Return the radius that the header, the redo panel and strokes show: one that fits the surface until it is set."""
-    guides = None if is_set else guides_of(getattr(bpy.context, "object", None))
-    return value if guides is None else flow_painting.default_radius(guides) or value
-
-
-def _annotations():
-    found = setting_properties.annotations(FlowSettings)
-    radius = bpy.props.FloatProperty(**found["radius"].keywords, get_transform=_fitted_radius)
-    return found | {"radius": radius} | strokes.annotations()
+def _fitted_radius():
+    """Return the radius of the brush [m] that fits the surface of the active guides, or None."""
+    guides = guides_of(getattr(bpy.context, "object", None))
+    return None if guides is None else flow_painting.default_radius(guides)
 
 
 class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
@@ -40,7 +34,7 @@ class VELLUS_OT_paint_flow(GuideTool, bpy.types.Operator):
     bl_label = "Paint Flow"
     bl_options = {"REGISTER", "UNDO", "BLOCKING"}
     Settings = FlowSettings
-    __annotations__ = _annotations()
+    __annotations__ = setting_properties.annotations(FlowSettings) | strokes.annotations(_fitted_radius)
 
     def invoke(self, context, event):
         """Begin a stroke where the mouse is pressed on the surface; elsewhere Blender handles the event."""
