@@ -3,9 +3,10 @@
 
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 
-Guides are combed, a slider of their weights or of a style moves, the surface bends with the frames or by a slider, or
-simulated guides play. Hair is shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are
-made by the compute device and uploaded, or made where they are drawn; the bytes that a change uploads are counted.
+Guides are combed, a slider of their weights or of a style moves, the surface bends with the frames or by a slider,
+simulated guides play, or a brush paints the image of maps. Hair is shaded by the Marschner model with shadows, as a
+viewport draws meanwhile. Strands are made by the compute device and uploaded, or made where they are drawn; the bytes
+that a change uploads are counted.
 """
 
 import argparse
@@ -32,14 +33,16 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
-from hair_addon.blender.settings import preferences, style_items
+from hair_addon.blender.settings import map_items, preferences, style_items
+from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
 from tests.support.counting import Traffic
 from tests.support.pictures import drawn_strands
 
 REPETITIONS = 50
-ACTIONS = ("stroke", "slider", "surface", "bending", "playback")
+IMAGE_SIZE = 2048  # of painted images
+ACTIONS = ("stroke", "slider", "surface", "bending", "playback", "paint")
 _OF_SURFACE = {"surface", "bending"}
 
 # Parts that are timed and waited for one by one; the remaining time is the host's.
@@ -110,6 +113,21 @@ class Editing:
         """Let Blender evaluate the scene, and handlers follow."""
         work()
 
+    def paint(self):
+        """End a stroke of a brush of 512 × 512 texels on the image of maps."""
+        self.turn += 1
+        self.brush(bpy.data.images["Coat"])
+        self.evaluate(bpy.context.view_layer.update)
+
+    def brush(self, image):
+        """Change an image as a brush does, which costs Blender less than this."""
+        pixels = np.empty(IMAGE_SIZE * IMAGE_SIZE * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        low, left = 512 * (self.turn // 4 % (IMAGE_SIZE // 512)), 512 * (self.turn % (IMAGE_SIZE // 512))
+        pixels.reshape(IMAGE_SIZE, IMAGE_SIZE, 4)[low : low + 512, left : left + 512, :3] = 0.1 + 0.1 * (self.turn % 5)
+        image.pixels.foreach_set(pixels)
+        image.update_tag()
+
     def playback(self):
         """Show guides at their simulated points of the next frame."""
         self._combed()
@@ -168,6 +186,22 @@ class Editing:
 
 
 PARTS["evaluation"] = (Editing, "evaluate")
+PARTS["brush"] = (Editing, "brush")
+
+
+def give_maps(hair, settings):
+    """Give settings of the look maps of one image, which a material shows as while it is painted."""
+    image = bpy.data.images.new("Coat", IMAGE_SIZE, IMAGE_SIZE, alpha=True)
+    image.pixels.foreach_set(np.tile(np.float32([0.3, 0.15, 0.05, 1.0]), IMAGE_SIZE * IMAGE_SIZE))
+    material = bpy.data.materials.new("Painted")
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    hair.data.surface.data.materials.append(material)
+    hair.data.vellus.appearance.parametrization = "COLOR"
+    for setting in settings:
+        map_items.keep(hair.data.vellus, MapSettings(setting=setting, source="Coat"))
+    bpy.context.view_layer.update()
+    if hair.data.vellus.shading_status:
+        raise SystemExit(hair.data.vellus.shading_status)
 
 
 def bend(surface, frames):
@@ -207,6 +241,7 @@ def main():
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--styles", nargs="+", default=[], choices=sorted(KINDS), help="that the hair has")
     parser.add_argument("--actions", nargs="+", default=ACTIONS, choices=ACTIONS)
+    parser.add_argument("--maps", nargs="*", default=["look.color"], help="settings with a map, for painting")
     parser.add_argument("--ways", nargs="+", default=["COMPUTE", "GPU"], help="where strands are made")
     parser.add_argument("--devices", nargs="+", default=["cpu"], help="Warp devices of the way by uploads")
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
@@ -248,6 +283,8 @@ def _measure_way(options, strand_count, device, action, share, way):
     bpy.context.view_layer.update()
     live_hair.write_all()
     head.light()
+    if action == "paint":
+        give_maps(hair, options.maps)
     if action in _OF_SURFACE:
         bend(hair.data.surface, 4 * options.repetitions if action == "surface" else 0)
     scene_time.is_shown_moving = lambda: action == "surface"
