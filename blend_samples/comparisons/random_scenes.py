@@ -29,6 +29,9 @@ import hair_addon
 from blend_samples.comparisons import random_scene
 from blend_samples.sheets import line_plot, picture_pairs
 from hair_addon import api
+from hair_addon.blender.data import scene as data_scene
+from hair_addon.blender.gpu import drawing
+from hair_addon.blender.render import drawn_scene, film, light_paths
 
 _VERSION = 2  # of how references are rendered
 _SAME_HAIR = 2e-4  # [m] that processors may differ in the mean and the spread of the same hair's points
@@ -178,8 +181,16 @@ def kept_or_drawn(seed, options):
 
 
 def by_vellus(size):
-    """Return (H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
-    return api.draw(width=size, height=size, samples_per_side=4, is_transparent=True)
+    """Return (H, W, 4) linear premultiplied pixels of the hair, with the samples and the filter of a render."""
+    blender_scene, depsgraph = bpy.context.scene, data_scene.present_depsgraph()
+    camera = data_scene.read_camera(blender_scene, depsgraph, size, size)
+    drawn = drawn_scene.read(blender_scene, bpy.context.view_layer, depsgraph)
+    drawn = light_paths.with_grid(drawn, *camera, light_paths.path_count(blender_scene, (size, size)))
+    picture = film.Film((size, size), 4, ("Combined",), True, 2.0 * blender_scene.render.filter_size)
+    for turn in range(blender_scene.vellus.sample_count // 16):
+        with drawing.ALONE:
+            picture.add_pass(drawn, *camera, (size, size), turn)
+    return picture.read()["Combined"]
 
 
 def line(row):

@@ -109,7 +109,7 @@ def test_openimageio_reads_the_same_mattes(three, tmp_path):
 @pytest.mark.parametrize("how", ["filter", "motion blur", "depth of field", "tiles"])
 def test_coverages_are_those_of_the_samples(three, tmp_path, monkeypatch, how):
     """Coverages and the empty part sum to 1 within 0.001, and the coverage of hair is the hair mask."""
-    scene, settings = bpy.context.scene, {"filter_size": 1.5}
+    scene, settings = bpy.context.scene, {"filter_size": 0.75}
     if how == "motion blur":
         motion(scene)
     elif how == "depth of field":
