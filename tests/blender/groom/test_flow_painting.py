@@ -10,6 +10,7 @@ from bpy_extras import view3d_utils
 from mathutils import Matrix, Vector
 
 from hair_addon import api
+from hair_addon.blender.data.strands import frozen_points
 from hair_addon.blender.groom.guides import flow_painting
 from hair_addon.blender.ui import brush_circle, tools
 from hair_addon.blender.ui.operators.flow_painting import VELLUS_OT_paint_flow, VELLUS_OT_size_flow_brush
@@ -150,6 +151,18 @@ def test_selected_guides_and_layers_take_the_stroke(guides):
     guides.data.vellus.layers[0].weight = 0.0
     bpy.context.view_layer.update()
     np.testing.assert_allclose(points(guides), before, atol=1e-6)
+
+
+def test_frozen_points_stay_while_others_turn(guides):
+    before = points(guides)
+    frozen = np.zeros(before.shape[:2], bool)
+    frozen[before[:, 0, 1] > 0.3] = True
+    frozen_points.write(guides.data, frozen.ravel())
+    after = paint(arc())
+    assert np.array_equal(after[frozen], before[frozen])
+    away = distances(before, arc())
+    near = (away < 0.5 * RADIUS) & ~frozen.any(axis=1)
+    assert near.any() and (after[near] != before[near]).any(axis=(1, 2)).all()
 
 
 def test_the_api_paints_as_the_operator_does(guides):

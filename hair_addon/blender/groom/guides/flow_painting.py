@@ -74,7 +74,7 @@ class FlowStroke:
         if self._settings.mirrored:
             directions, shares = grooming.painted_flow.joined_flow(*self._sides)
         shares = shares * guides.weights
-        after = guides.points.copy()
+        shapes = []
         for chosen, places in guide_tools.to_shape(guides):
             is_near = shares[chosen] > 0.0
             chosen, places = chosen[is_near], places[is_near]
@@ -83,8 +83,9 @@ class FlowStroke:
             points, normals = guides.points[places], guides.normals[chosen]
             flow = self._at_rest(directions, chosen)
             turned = grooming.painted_flow.turned_along(points, normals, flow, shares[chosen], self._settings)
-            after[places] = turned if barrier is None else outside_guides.pushed(guides, barrier, turned, chosen)
-        return guide_tools.write_shapes(guides, after)
+            turned = turned if barrier is None else outside_guides.pushed(guides, barrier, turned, chosen)
+            shapes.append((places, turned))
+        return guide_tools.write_some(guides, shapes)
 
     def _at_rest(self, directions, chosen):
         """Return directions (M, 3) at the posed roots of chosen guides, carried to the surface at rest."""

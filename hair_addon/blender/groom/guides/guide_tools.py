@@ -5,7 +5,7 @@ Guides keep their roots, and unchanged guides keep all their bits. As after comb
 guides, and hair follows at Blender's next update.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -91,12 +91,22 @@ class CombedGuides:
 
     def posed_of(self, chosen: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Return points (M, P, 3) float32 [m] of chosen guides on the deformed surface; places: from `of_count`."""
+        return self.posed_shape(chosen, self.points[places], lambda: self.local[places])
+
+    def posed_shape(
+        self, chosen: np.ndarray, shape: np.ndarray, local: Callable[[], np.ndarray] | None = None
+    ) -> np.ndarray:
+        """Return points (M, P, 3) float32 [m] of chosen guides with a shape (M, P, 3) [m] on the deformed surface.
+
+        local: a function that returns the shape in local coordinates, if it is known.
+        """
         pose = posed_strands.pose_of(self.surface)
         if not pose.is_deformed:
-            return self.points[places]
+            return shape
         roots = self.surface.places(self.roots)
         some = tuple(part[chosen] for part in roots)
-        return self.surface.from_local(posed_strands.carried(self.local[places], pose.motion_at(roots[0]), some))
+        local_shape = self.surface.to_local(shape) if local is None else local()
+        return self.surface.from_local(posed_strands.carried(local_shape, pose.motion_at(roots[0]), some))
 
     def posed(self) -> np.ndarray:
         """Return (N, 3) float32 [m] points on the surface deformed by shape keys and modifiers."""
@@ -186,8 +196,7 @@ def to_shape(guides: CombedGuides) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
     """Write points (N, 3) [m] of guides; returns the number changed. Raises `HairError`."""
-    if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
-        raise HairError("The guides would extend too far from their surface: use smaller values.")
+    _require_near(after)
     after = frozen_points.restored(guides.datablock, guides.points, after)
     is_moved = (after != guides.points).any(axis=1)
     local = guides.local.copy()
@@ -196,6 +205,34 @@ def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
         attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", local)
         guides.datablock.update_tag()
     return int(np.count_nonzero(np.add.reduceat(is_moved, guides.starts[:-1])))
+
+
+def write_some(guides: CombedGuides, shapes: Sequence[tuple[np.ndarray, np.ndarray]]) -> int:
+    """Write the shapes of some guides, and the others as they were read; returns the number changed.
+
+    shapes: pairs of the indices (M, P) of points, and points (M, P, 3) float32 [m]. As strokes call this at each event,
+    other guides are not compared. Raises `HairError`.
+    """
+    if frozen_points.read(guides.datablock) is not None:
+        after = guides.points.copy()
+        for places, shape in shapes:
+            after[places] = shape
+        return write_shapes(guides, after)
+    local, moved_count = guides.local.copy(), 0
+    for places, shape in shapes:
+        _require_near(shape)
+        is_moved = (shape != guides.points[places]).any(axis=2)
+        local[places[is_moved]] = guides.surface.to_local(shape[is_moved][:, None])[:, 0]
+        moved_count += int(np.count_nonzero(is_moved.any(axis=1)))
+    attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", local)
+    guides.datablock.update_tag()
+    return moved_count
+
+
+def _require_near(points):
+    """Raise `HairError` unless points (..., 3) [m] are finite and near their surface."""
+    if not np.abs(points).max(initial=0.0) < _FARTHEST:  # also refuses NaN
+        raise HairError("The guides would extend too far from their surface: use smaller values.")
 
 
 def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsgraph) -> int:

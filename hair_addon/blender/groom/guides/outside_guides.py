@@ -153,18 +153,20 @@ def pushed_posed(barrier: _Barrier, posed: np.ndarray) -> np.ndarray:
 def pushed(guides: CombedGuides, barrier: _Barrier, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Return new points (M, P, 3) float32 [m] of chosen guides (M,) pushed outside of the posed surface."""
     places = guides.of_count(points.shape[1], chosen)
-    local, here = guides.local.copy(), guides.points.copy()
-    here[places] = points
-    local[places] = guides.surface.to_local(points)
-    return _pushed(replace(guides, local=local, points=here), barrier, chosen, places)[0]
+    return _pushed_shape(guides, barrier, chosen, places, points, guides.posed_shape(chosen, points))[0]
 
 
 def _pushed(guides, barrier, chosen, places):
     """Return (points (M, P, 3) float32 [m] at rest outside of the posed surface, (M,) bool: which guides moved)."""
     posed = guides.posed_of(chosen, places)
+    return _pushed_shape(guides, barrier, chosen, places, guides.points[places], posed)
+
+
+def _pushed_shape(guides, barrier, chosen, places, shape, posed):
+    """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3)."""
     held = _held(guides.datablock, places)
     after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held)
-    pushed = guides.points[places]
+    pushed = shape.copy()
     if is_moved.any():
         after = (after[is_moved] / barrier.factor).astype(np.float32)
         is_same = (after == posed[is_moved]).all(axis=2)
