@@ -81,6 +81,7 @@ OTHERS = (
     scene.faces_cache,
     scene.surface_cache,
     sources.texel_cache,
+    sources.level_cache,
     image_pixels.converted_cache,
     drawn_meshes.layout_cache,
     surface_means.picture_cache,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Values of images at roots: the mean over each strand's share of the surface, so that fine patterns do not alias."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from ..geometry.mesh import SurfacePoints, TriMesh
 from ..kernels import parallel
 from ..kernels.checks import require_indices
 from . import uv_islands
+from .pixels import changed_box
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -41,24 +43,45 @@ class RootTexels:
     strand_count: int
     tiles: Mapping[int | None, _Taps]
 
-    def sample(self, pixels: Mapping[int | None, np.ndarray]) -> np.ndarray:
+    def sample(self, pixels: "Mapping[int | None, np.ndarray | Levels]") -> np.ndarray:
         """Return means (S, C) float32, NaN without a tile; pixels: {tile: (H, W, C) float32, bottom row first}."""
-        channels = next(iter(pixels.values())).shape[2] if pixels else 1
+        levels = {tile: each if isinstance(each, Levels) else Levels(each) for tile, each in pixels.items()}
+        channels = next(iter(levels.values())).pixels.shape[2] if levels else 1
         found = np.full((self.strand_count, channels), np.nan, np.float32)
         for tile, taps in self.tiles.items():
-            if tile in pixels:
-                found[taps.strands] = _means(taps, _levels(pixels[tile], taps.size))
+            if tile in levels:
+                size = levels[tile].pixels.shape[1::-1]
+                if size != tuple(taps.size):
+                    raise ValueError(f"pixels of size {size} at places for {taps.size}")
+                found[taps.strands] = _means(taps, levels[tile].texels)
         return found
 
 
-def _levels(pixels, size):
-    """Return the texels (N, C) of an image and its halved versions, one after the other."""
-    if pixels.shape[1::-1] != tuple(size):
-        raise ValueError(f"pixels of size {pixels.shape[1::-1]} at places for {size}")
-    levels = [np.ascontiguousarray(pixels, np.float32)]
-    while max(levels[-1].shape[:2]) > 1:
-        levels.append(halved(levels[-1]))
-    return np.concatenate([level.reshape(-1, pixels.shape[2]) for level in levels])
+class Levels:
+    """The texels (N, C) of an image (H, W, C) and its halved versions, one after the other."""
+
+    def __init__(self, pixels: np.ndarray) -> None:
+        """Halve the image; its pixels must not change."""
+        self.pixels = pixels
+        levels = [np.ascontiguousarray(pixels, np.float32)]
+        while max(levels[-1].shape[:2]) > 1:
+            levels.append(halved(levels[-1]))
+        self.texels = np.concatenate([level.reshape(-1, pixels.shape[2]) for level in levels])
+        self._shapes = [level.shape for level in levels]
+
+    def follow(self, pixels: np.ndarray) -> None:
+        """Show other pixels of the same shape: only rows that differ are halved again."""
+        changed = None if pixels is self.pixels else changed_box(self.pixels, pixels)
+        self.pixels = pixels
+        if changed is None:
+            return
+        first, last = changed[0].start, changed[0].stop
+        ends = np.cumsum([height * width for height, width, _channels in self._shapes])
+        levels = [part.reshape(s) for part, s in zip(np.split(self.texels, ends[:-1]), self._shapes, strict=True)]
+        levels[0][first:last] = pixels[first:last]
+        for finer, level in itertools.pairwise(levels):
+            first, last = first // 2, (last + 1) // 2
+            level[first:last] = halved(finer[2 * first : 2 * last])
 
 
 def halved(pixels: np.ndarray) -> np.ndarray:

@@ -29,13 +29,17 @@ def colors(
     return _reduced(pixels, lambda rows: _premultiplied(rows, is_srgb, has_alpha, is_premultiplied))
 
 
-def changed_rows(before: np.ndarray, now: np.ndarray) -> slice | None:
-    """Return the slice from the first to the last row in which images (H, W, C) float32 differ; None if all agree."""
+def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | None:
+    """Return the slices of the rows and columns in which images (H, W, C) float32 differ; None if all bits agree."""
     bits = [
         np.ascontiguousarray(pixels, np.float32).view(np.int32).reshape(len(pixels), -1) for pixels in (before, now)
     ]
     rows = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
-    return slice(int(rows[0]), int(rows[-1]) + 1) if len(rows) else None
+    if not len(rows):
+        return None
+    changed = slice(int(rows[0]), int(rows[-1]) + 1)
+    texels = np.flatnonzero((bits[0][changed] != bits[1][changed]).any(axis=0)) // now.shape[2]
+    return changed, slice(int(texels[0]), int(texels[-1]) + 1)
 
 
 def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

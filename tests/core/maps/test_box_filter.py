@@ -2,6 +2,7 @@
 """Values of images at roots are means over the strands' shares of the surface."""
 
 import numpy as np
+import pytest
 
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
 from hair_addon.core.maps import box_filter, combination, pixels
@@ -29,6 +30,28 @@ def roots_on(mesh, count, rng):
 
 def sampled(mesh, uvs, roots, image):
     return box_filter.root_texels(mesh, uvs, roots, {None: image.shape[1::-1]}).sample({None: image})
+
+
+@pytest.mark.parametrize("shape", [(16, 32, 4), (37, 53, 1), (1, 5, 4), (9, 1, 1)])
+def test_levels_follow_changes(rng, shape):
+    """The levels of an image whose texels change are, bit for bit, those of the changed image."""
+    image = rng.random(shape).astype(np.float32)
+    levels = box_filter.Levels(image)
+    for _ in range(6):
+        low, left = (rng.integers(0, side) for side in shape[:2])
+        image = image.copy()
+        image[low : low + rng.integers(0, 4), left : left + 3] = rng.random()
+        levels.follow(image)
+        np.testing.assert_array_equal(levels.texels, box_filter.Levels(image).texels)
+
+
+def test_the_changed_box_holds_all_changes(rng):
+    """The box of changed texels is the smallest that holds them; images of the same bits have none."""
+    image = rng.random((20, 30, 4)).astype(np.float32)
+    other = image.copy()
+    assert pixels.changed_box(image, other) is None
+    other[3, 7, 1], other[11, 5, 3] = 2.0, np.nan
+    assert pixels.changed_box(image, other) == (slice(3, 12), slice(5, 8))
 
 
 def test_a_constant_image_is_the_constant(rng):

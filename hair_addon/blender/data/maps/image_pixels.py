@@ -107,7 +107,7 @@ def _named(path, number):
 
 
 def _pixels_of(image, named, is_color, is_painted=False):
-    """Converted pixels (H, W, C). Of a painted image only changed rows are converted again."""
+    """Converted pixels (H, W, C). Of a painted image only the changed box is converted again."""
     width, height = image.size
     if not (width and height and image.channels):
         raise _without_pixels(named)
@@ -119,11 +119,11 @@ def _pixels_of(image, named, is_color, is_painted=False):
     known = converted_cache.get(key)
     if known is None or known.way != way or known.raw.shape != raw.shape:
         return converted_cache.keep(key, _Converted(raw, way, convert(raw, **way))).pixels
-    rows = pixels.changed_rows(known.raw, raw)
-    if rows is None:
+    changed = pixels.changed_box(known.raw, raw)
+    if changed is None:
         return known.pixels
     found = known.pixels.copy()  # other users of the image compare their pixels with it
-    found[rows] = convert(raw[rows], **way)
+    found[changed] = convert(raw[changed], **way)
     return converted_cache.keep(key, _Converted(raw, way, found)).pixels
 
 

@@ -135,7 +135,18 @@ class Source:
         if known is None or not (known.roots.is_same(roots) and np.array_equal(known.corner_uvs, self.corners)):
             texels = maps.box_filter.root_texels(self.surface.mesh, self.corners, roots, sizes)
             known = texel_cache.keep(key, _Known(roots, self.corners, sizes, texels))
-        return known.texels.sample(self.pixels)
+        return known.texels.sample({tile: self._levels(tile, values) for tile, values in self.pixels.items()})
+
+    def _levels(self, tile, values):
+        """Return the `Levels` of an image, which follow the changes of a painted one."""
+        if tile is not None:
+            return maps.box_filter.Levels(values)
+        key = self.settings.source, self.is_color
+        levels = level_cache.get(key)
+        if levels is None or levels.pixels.shape != values.shape:
+            return level_cache.keep(key, maps.box_filter.Levels(values))
+        levels.follow(values)
+        return levels
 
 
 def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
@@ -242,6 +253,8 @@ class _Known:
 
 # (session_uid of hair, UV map, sizes, number of roots) → `_Known`, which is checked.
 texel_cache = Cache(capacity=16)
+# (name of an image, whether as colors) → `Levels` of an image without tiles.
+level_cache = Cache(capacity=2)
 
 
 def _corner_uvs(surface_object, surface, name):
