@@ -3,9 +3,9 @@
 
 A strand's point x beside the point c(s) of its course keeps its offset in a frame that moves with the course:
 
-    x' = x + (c'(s) - c(s)) + (Q(s) - 1) (x - c(s))
+    x' = x + (c'(s) - c(s)) + (Q(s) - 1) (x - c(s) - d)
 
-Where the course does not move, both terms are zero and no bit changes. Q rotates the former tangents of the course to
+d is the offset of the strand's first point, which does not turn: a root stays beside its course's root. Where the course does not move, both terms are zero and no bit changes. Q rotates the former tangents of the course to
 the present tangents. At the root, Q is a rotation about the surface's normal, in proportion to how closely the course
 lies along the surface, followed by the least rotation. Q continues along the course by least rotations [Bishop75], so
 that strands are not twisted.
@@ -145,7 +145,9 @@ def _carried(
     low = _least_rotation(wp.quat_rotate(low, _tangent(before, strand, 0)), _tangent(now, strand, 0)) * low
     high = _least_rotation(wp.quat_rotate(low, _tangent(before, strand, 1)), _tangent(now, strand, 1)) * low
     segment = int(0)
-    for point in range(starts[strand], starts[strand] + counts[strand]):
+    first = starts[strand]
+    at_root = wp.vec3()
+    for point in range(first, first + counts[strand]):
         place = places[point] * float(segment_count)
         while segment < segment_count - 1 and place > float(segment + 1):
             segment += 1
@@ -156,9 +158,13 @@ def _carried(
         rotation = wp.normalize((1.0 - share) * low + share * high)
         there = (1.0 - share) * before[strand, segment] + share * before[strand, segment + 1]
         here = (1.0 - share) * now[strand, segment] + share * now[strand, segment + 1]
+        move = here - there
+        offset = points[point] - there
         if is_back:
+            move = there - here
             offset = points[point] - here
-            out_points[point] = points[point] + (there - here) + (wp.quat_rotate_inv(rotation, offset) - offset)
-        else:
-            offset = points[point] - there
-            out_points[point] = points[point] + (here - there) + (wp.quat_rotate(rotation, offset) - offset)
+            rotation = wp.quat_inverse(rotation)
+        if point == first:
+            at_root = offset
+        offset -= at_root
+        out_points[point] = points[point] + move + (wp.quat_rotate(rotation, offset) - offset)

@@ -80,19 +80,23 @@ def test_what_turns_all_with_the_surface_turns_the_strands(rng, beside):
     np.testing.assert_allclose(carry(turned, before @ turn.T, now @ turn.T, turn @ UP), expected, atol=2e-5)
 
 
-def test_offsets_keep_their_lengths(rng, beside):
+def test_offsets_from_the_root_keep_their_lengths(rng, beside):
     """Two strands with the same places are turned alike, so the distance between their points stays."""
     before, now = courses_from(rng, 0.5), crooked(rng)
     points, starts, places = beside(before)
     others = (points + rng.normal(scale=0.1, size=points.shape)).astype(np.float32)
+    aside = np.repeat((others - points)[starts[:-1]], np.diff(starts), axis=0)
     apart = carry((others, starts, places), before, now) - carry((points, starts, places), before, now)
-    np.testing.assert_allclose(np.linalg.norm(apart, axis=1), np.linalg.norm(others - points, axis=1), atol=1e-5)
+    expected = np.linalg.norm(others - points - aside, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(apart - aside, axis=1), expected, atol=1e-5)
 
 
-def test_roots_stay_on_their_courses(rng, beside):
+def test_roots_keep_their_offsets_from_their_courses(rng, beside):
     before, now = courses_from(rng, 0.5), courses_from(rng, 1.3)
-    given = beside(before)
-    np.testing.assert_allclose(carry(given, before, now)[given[1][:-1]], 0.0, atol=1e-6)
+    points, starts, places = beside(before)
+    shifts = rng.normal(scale=0.1, size=(COUNT, 3))
+    given = (points + np.repeat(shifts, np.diff(starts), axis=0)).astype(np.float32), starts, places
+    np.testing.assert_allclose(carry(given, before, now)[starts[:-1]], shifts, atol=1e-6)
 
 
 def test_the_way_back_is_the_inverse(rng, beside):
