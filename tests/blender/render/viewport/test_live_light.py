@@ -39,18 +39,18 @@ def view(scene, rng):
     live_light.end()
 
 
-def at_rest(live, drawn, camera):
+def at_rest(live, drawn, camera, paths=PATHS):
     """Return the scene once all paths are traced."""
     for _share in range(100):
-        found = redrawn(live, drawn, camera)
+        found = redrawn(live, drawn, camera, paths=paths)
         live.wait()
         if live.is_done:
             return found
     raise AssertionError("paths are followed without an end")
 
 
-def redrawn(live, drawn, camera, may_follow=True):
-    return live.lit(drawn, camera, PATHS, next(TIMES), may_follow)
+def redrawn(live, drawn, camera, may_follow=True, paths=PATHS):
+    return live.lit(drawn, camera, paths, next(TIMES), may_follow)
 
 
 def picture_of(drawn, camera):
@@ -78,18 +78,19 @@ def turned(camera, degrees):
 
 
 def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
-    """At rest the light of blocks of pixels equals that of renders within 4 % of the mean.
+    """At rest the light of blocks of pixels equals that of renders within 3 % of the mean, with enough
+    paths for a noise of 2 %.
 
     Dual scattering differs by more.
     """
     camera, read = view
-    drawn = read()
-    found = at_rest(live_light.LiveLight(), drawn, camera)
+    drawn, paths = read(), 20 * PATHS
+    found = at_rest(live_light.LiveLight(), drawn, camera, paths)
     live, render, dual = (
-        blocks(picture_of(one, camera)) for one in (found, light_paths.with_grid(drawn, *camera, 4 * PATHS), drawn)
+        blocks(picture_of(one, camera)) for one in (found, light_paths.with_grid(drawn, *camera, paths, seed=1), drawn)
     )
     scale = render.mean()
-    assert np.abs(live - render).mean() < 0.04 * scale
+    assert np.abs(live - render).mean() < 0.03 * scale
     assert np.abs(dual - render).mean() > 0.06 * scale
 
 
