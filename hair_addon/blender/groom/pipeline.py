@@ -353,13 +353,15 @@ def restyle(
     """Apply the present styles and map of the thickness to bound hair; returns whether nothing else had changed.
 
     is_drawn: whether the GPU generates the shown strands. Nothing is searched, and nothing is computed if styles are
-    unchanged. Raises `HairError`.
+    unchanged: on a surface that was scaled since, hair keeps the scale that it was bound at until a style changes.
+    Raises `HairError`.
     """
     bound = bindings.of(target)
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    if not bindings.has_scale(bound, guide_curves.surface):
+    has_scale = bindings.has_scale(bound, guide_curves.surface)
+    if not has_scale and surface_space.is_flattened(guide_curves.surface):
         return False
     if not bindings.can_read_masks(bound, target, depsgraph):  # rebinding the hair reports the error
         return False
@@ -371,6 +373,8 @@ def restyle(
     styles = style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, guide_curves.surface, bound.surface, guide_curves, depsgraph, target)
     if not read.is_same(bound.styles.read):
+        if not has_scale:
+            return False
         trees = bound.styles.shared_trees()
         styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
         bound.restyle(styles, is_drawn(bound, styles))

@@ -385,3 +385,22 @@ def test_styles_have_the_present_scale_of_the_surface(hair, scale, angle):
     bindings.invalidate(hair.data)
     pipeline.evaluate(hair.data, bpy.context.evaluated_depsgraph_get())
     np.testing.assert_allclose(points(hair), followed, rtol=0.0, atol=1e-5)
+
+
+def test_hair_of_a_scaled_surface_stays_while_its_masks_do(hair):
+    """A reported mesh whose weights did not change keeps the strands of hair that was bound at another scale."""
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.add_style(style="TRIM")
+    surface, trim = hair.data.surface, hair.data.vellus.styles[0].trim
+    surface.vertex_groups.new(name="Cut").add(range(len(surface.data.vertices)), 0.5, "REPLACE")
+    trim.mask, trim.to_length = "Cut", 0.1
+    update()
+    surface.scale = (2.0, 2.0, 2.0)
+    update()
+    before = points(hair)
+    surface.data.update()
+    update()
+    np.testing.assert_array_equal(points(hair), before)
+    trim.to_length = 0.1001
+    update()
+    assert np.abs(points(hair) - before).max() > 0.01
