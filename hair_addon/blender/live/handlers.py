@@ -390,7 +390,9 @@ def after_import(context=None, *_args):
 
 @persistent
 def after_load(*_args):
-    """Take the hair of a file as up to date; without a window Blender reports no update of it."""
+    """Take the hair of a file as up to date, and show its baked frames if Blender has no window: it reports no
+    update of the file.
+    """
     global _is_opening, _is_undone
     _is_opening = not bpy.app.background
     _is_undone = True  # does not affect a file that was saved during a stroke
@@ -403,6 +405,8 @@ def after_load(*_args):
     file_changes.follow(bpy.data.scenes)
     _hide_drawn_hair()
     composite.follow_all()  # a file does not store that linked hair is hidden from other engines
+    if bpy.app.background and any(frame_folders.simulating()):
+        simulated_hair.follow_undo(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
 
 
 def _hide_drawn_hair():

@@ -108,7 +108,7 @@ def note_combed(combed, blender_scene):
 
 def follow_undo(blender_scene, depsgraph):
     """Show simulated guides again after an undo, a redo or a load, which show them as combed."""
-    for guides in frame_folders.simulating() if running.has_window() else ():
+    for guides in frame_folders.simulating():
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
             _note_state(guides, blender_scene)

@@ -7,7 +7,6 @@ import bpy
 import numpy as np
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
@@ -39,16 +38,14 @@ def are_kept(kinds, is_in_world=False):
     bpy.context.view_layer.update()
     after = _drawn(kinds, is_in_world)
     for name in before.keys() & after.keys():
-        (lengths, size, was_simulated), (now, _size, is_simulated) = before[name], after[name]
-        if was_simulated != is_simulated:  # without a window undo shows baked guides as combed, until the next update
-            continue
+        (lengths, size), (now, _size) = before[name], after[name]
         assert len(now) == len(lengths), f"{name} has {len(now)} strands, {len(lengths)} before"
         away = float(abs(now - lengths).max(initial=0.0))
         assert away <= _ROUNDING * size, f"{name} is up to {away:.3g} longer or shorter, of {size:.3g}"
 
 
 def _drawn(kinds, is_in_world):
-    """Return {object's name: ((S,) lengths, largest distance of a point from the origin, whether simulated)}."""
+    """Return {object's name: ((S,) lengths, largest distance of a point from the origin)}."""
     found = {}
     for one in bpy.context.view_layer.objects:
         if one.type != "CURVES" or one.data.vellus.kind not in kinds or not len(one.data.curves):
@@ -63,8 +60,7 @@ def _drawn(kinds, is_in_world):
             if is_in_world:
                 place = np.array(one.matrix_world)
                 points = points @ place[:3, :3].T + place[:3, 3]
-            is_simulated = simulated_guides.is_shown(guides)
-            found[one.name] = strands.lengths(points), float(abs(points).max()), is_simulated
+            found[one.name] = strands.lengths(points), float(abs(points).max())
     return found
 
 
