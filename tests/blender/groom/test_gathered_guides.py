@@ -156,7 +156,6 @@ def test_cornrows_lie_on_the_surface_beside_their_curves(guides, placed):
     before = points(guides)
     gather(guides, shape="CORNROWS")
     after = points(guides)
-    np.testing.assert_allclose(segments(after), segments(before), rtol=0.01)
     assert np.linalg.norm(after[:, 1:], axis=2).min() > 0.993
     root = before[:, 0]
     is_near = (np.abs(np.abs(root[:, 0]) - 0.3) < 0.35) & (np.abs(root[:, 1]) < 0.6) & (root[:, 2] > 0.0)

@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cornrows: guides go over the surface to the nearest drawn line, and along it as a braid that lies on the surface.
 
-The way of a root to its line descends the distance from the whole line. At the line, the guide joins the braid and
-follows it to the end of the line; longer hair continues straight ahead.
+The way of a root to its row descends the distance from the whole line. There, the guide joins the lock that is
+outermost on its side, and follows it to the end of the row and of its tail.
+
+All guides of a row have their points behind the place where they join it at the same places of the row: a strand
+between two guides is a mean of them, which would lie between two places of a lock, out of the braid. So the guides of
+a row become as long as they need to end together. As guides have few points, a pitch has six of them, at which the
+three locks are in the same places.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +23,21 @@ from .gather_settings import GatherSettings
 
 _SAMPLES = 400  # points of a line on the surface
 _END = 20  # samples over which the direction at the end is averaged
-_WIDE = 1e9  # reach of a braid that does not taper [m]
-_RISE = 0.6  # height of a braid's middle above its clearance, relative to its radius
+_RISE = 0.75  # height of a braid's middle above its clearance, relative to its radius
+_ON_WAY = 4  # least number of segments of a guide before it follows a row
+_OF_PITCH = 6  # segments in which a lock returns to its place
+_ASIDE, _ABOVE, _LOCK = 0.62, 0.36, 0.42  # path of a lock across the braid, and its radius, relative to the braid's
+_TIP = 0.35  # radius of the tail's end, relative to the row
+
+
+@dataclass(frozen=True)
+class Row:
+    """The middle of a braid; on_surface: length [m] of the part on the surface; places (K,) [m]: of points along it."""
+
+    line: tie_tails.TailLine
+    on_surface: float
+    places: np.ndarray
+    pitch: float
 
 
 def on_surface(query: SurfaceQuery, mesh: TriMesh, line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -28,48 +48,58 @@ def on_surface(query: SurfaceQuery, mesh: TriMesh, line: np.ndarray) -> tuple[np
     return mesh_math.positions(mesh, places).astype(np.float64), mesh_math.normals(mesh, places).astype(np.float64)
 
 
-def braid_line(points: np.ndarray, normals: np.ndarray, reach: float, settings: GatherSettings) -> tie_tails.TailLine:
-    """Return the middle of a braid over points (M, 3) [m] of the surface, continued straight by `reach` [m]."""
+def row(points: np.ndarray, normals: np.ndarray, tail: float, segments: int, settings: GatherSettings) -> Row:
+    """Return the `Row` over points (M, 3) [m] of the surface, with a straight tail [m], for guides of some segments."""
     lifted = points + (settings.clearance + _RISE * settings.tie_radius) * normals
     # The derivative at the end, of second order: hair goes on in the direction of a curved row's end.
     ahead = unit(3.0 * lifted[-1] - 4.0 * lifted[-1 - _END] + lifted[-1 - 2 * _END])
-    beyond = lifted[-1] + np.linspace(0.0, reach, _SAMPLES + 1)[1:, None] * ahead
+    beyond = lifted[-1] + np.linspace(0.0, tail, _SAMPLES + 1)[1:, None] * ahead
     centers = np.concatenate([lifted, beyond])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(centers, axis=0), axis=1))])
     tangents = unit(np.gradient(centers, axis=0))
     ups = np.concatenate([normals, np.broadcast_to(normals[-1], beyond.shape)])
     ups = unit(ups - tangents * np.sum(ups * tangents, axis=1, keepdims=True))
-    return tie_tails.TailLine(along, centers, unit(np.cross(tangents, ups)), ups, _WIDE)
+    line = tie_tails.TailLine(along, centers, unit(np.cross(tangents, ups)), ups, max(tail, 1e-9))
+    count = max(segments - min(_ON_WAY, segments - 1), 1)
+    places = np.linspace(0.0, along[-1], count + 1)
+    return Row(line, float(along[_SAMPLES - 1]), places, max(settings.pitch, _OF_PITCH * float(places[1])))
 
 
-def ways_along(
-    ways: np.ndarray, ranks: np.ndarray, line: tie_tails.TailLine, reach: float, settings: GatherSettings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the ways (S, M, 3) [m] of guides along a braid for `reach` [m], the locks (S,) that they join, and the
-    lengths (S,) [m] from there to the end of the row.
+def joined_at(row: Row, ways: np.ndarray, settings: GatherSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Return the places (S,) [m] along a row at which guides join it, and the locks (S,) that they join.
 
-    ways (S, K, 3): the ways to the braid; ranks (S,) in [0, 1]: of their lengths, from the shortest on.
+    ways (S, K, 3) [m]: from the roots to the row.
     """
     arrived, radius = ways[:, -1], settings.tie_radius
-    nearest = _nearest(line, arrived)
+    nearest = _nearest(row.line, arrived)
     # Ways over faces arrive less evenly than their roots lie beside the line.
-    before = line.along[_nearest(line, ways[:, 0])]
-    joined = np.clip(before, line.along[nearest] - radius, line.along[nearest] + radius) + radius
+    before = row.line.along[_nearest(row.line, ways[:, 0])]
+    places = np.clip(before, row.line.along[nearest] - radius, row.line.along[nearest] + radius) + radius
     # A guide joins the lock that is outermost on the side from which it comes. Its place in the lock changes little
     # with its place on the surface.
-    beside = np.sum((arrived - line.centers[nearest]) * line.sides[nearest], axis=1)
-    turns = joined / settings.pitch
+    beside = np.sum((arrived - row.line.centers[nearest]) * row.line.sides[nearest], axis=1)
     count = tie_tails.LOCKS["CORNROWS"]
-    locks = np.rint(count * (0.25 * np.sign(beside) - turns)).astype(int) % count
-    angles = 2.0 * np.pi * turns
-    along = joined[:, None] + np.linspace(0.0, reach, _SAMPLES)
+    return places, np.rint(count * (0.25 * np.sign(beside) - places / row.pitch)).astype(int) % count
+
+
+def points_of(
+    row: Row, places: np.ndarray, ranks: np.ndarray, locks: np.ndarray, settings: GatherSettings
+) -> np.ndarray:
+    """Return (S, K, 3) [m]: guides at the places (K,) of a row.
+
+    places (S,) [m]: where they join; ranks (S,) in [0, 1]: of the lengths of their ways, from the shortest on; locks
+    (S,): that they belong to.
+    """
+    along, line = row.places, row.line
+    radius = settings.tie_radius * (0.6 + 0.4 * tie_tails.ease(along / row.pitch))
+    radius = radius * (1.0 - (1.0 - _TIP) * tie_tails.ease((along - row.on_surface) / line.reach))
+    phase = 2.0 * np.pi * (along / row.pitch + (locks / tie_tails.LOCKS["CORNROWS"])[:, None])
+    angles = 2.0 * np.pi * tie_tails.LOCKS["CORNROWS"] * places / row.pitch
+    own = _LOCK * np.sqrt(ranks)
+    aside = _ASIDE * np.sin(phase) + (own * np.cos(angles))[:, None]
+    above = _ABOVE * np.sin(2.0 * phase) + (own * np.sin(angles))[:, None]
     centers, sides, ups = line.at(along)
-    offsets = tie_tails.offsets(line, angles, ranks, along, locks, settings)
-    return (
-        centers + offsets[..., :1] * sides + offsets[..., 1:] * ups,
-        locks,
-        np.maximum(line.along[_SAMPLES - 1] - joined, 0.0),
-    )
+    return centers + (radius * aside)[..., None] * sides + (radius * above)[..., None] * ups
 
 
 def _nearest(line, points):

@@ -4,7 +4,8 @@
 The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height
 grows toward the tie, because it lies on the hair of all roots that it passes: by the area of this hair divided by the
 circumference. Each guide keeps its angle around the tie, and its distance determines its place in the disk of the tie,
-by equal areas. Segments keep their lengths, except in buns; guides that are too short end before the tie.
+by equal areas. Segments keep their lengths, except in buns and cornrows; guides that are too short end before
+the tie.
 """
 
 from collections.abc import Sequence
@@ -61,7 +62,7 @@ def gathered(
         if len(rows) and points.shape[1] > 1:
             after[rows], locks, ends = _at_line(mesh, query, points[rows], line, field, settings)
             groups[rows] = 1 + place * lock_count + locks
-            held[rows] = np.clip(ends / np.maximum(split(points[rows])[1].sum(axis=1), 1e-30), 0.0, 1.0)
+            held[rows] = np.clip(ends / np.maximum(_lengths(after[rows]), 1e-30), 0.0, 1.0)
     return after, groups, held
 
 
@@ -95,12 +96,9 @@ def _at_line(mesh, query, points, line, field, settings):
     if settings.shape == "BUN":
         return _in_bun(mesh, query, points, (ways, ranks), line, settings)
     if settings.shape == "CORNROWS":
-        braid = cornrows.braid_line(*cornrows.on_surface(query, mesh, line), reach, settings)
-        behind, locks, left = cornrows.ways_along(ways, ranks, braid, reach, settings)
-        ends = _lengths(np.concatenate([ways, behind[:, :1]], axis=1)) + left
-    else:
-        ends = _lengths(ways)
-        behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
+        return _in_row(points, (ways, ranks), cornrows.on_surface(query, mesh, line), settings)
+    ends = _lengths(ways)
+    behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
     return _along(points, np.concatenate([ways, behind], axis=1)), locks, ends
 
 
@@ -124,6 +122,28 @@ def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
     evenly = _evenly(ways[is_long], on_way + 1)
     after[is_long] = np.concatenate([evenly, wound[is_long, 1:]], axis=1)
     return after, np.zeros(len(ways), int), np.full(len(ways), np.inf)
+
+
+def _in_row(points, ways_and_ranks, surface_below, settings):
+    """Return the result of `_at_line` for a cornrow: guides that are long enough to join it end where it ends."""
+    (ways, ranks), (ground, normals) = ways_and_ranks, surface_below
+    lengths, on_way, count = split(points)[1].sum(axis=1), _lengths(ways), points.shape[1] - 1
+    whole = cornrows.row(ground, normals, 0.0, count, settings)
+    places, _locks = cornrows.joined_at(whole, ways, settings)
+    tail = max(0.0, float(np.median(lengths - on_way - (whole.on_surface - places))))
+    row = cornrows.row(ground, normals, tail, count, settings)
+    places, locks = cornrows.joined_at(row, ways, settings)
+    braided = cornrows.points_of(row, places, ranks, locks, settings)
+    first = np.minimum(np.searchsorted(row.places, places), len(row.places) - 1)
+    after = _along(points, ways)
+    for guide in np.flatnonzero(lengths > on_way):
+        left = braided[guide, first[guide] :]
+        before = points.shape[1] - len(left)
+        way = np.concatenate([points[guide, :1], ways[guide, 1:], left[:1]])
+        after[guide] = np.concatenate([_evenly(way[None], before + 1)[0], left[1:]])
+    row_end = np.count_nonzero(row.places <= row.on_surface) - len(row.places)  # from the end
+    held = _lengths(after[:, : after.shape[1] + row_end])
+    return after, locks, held
 
 
 def _evenly(ways, count):
@@ -157,13 +177,13 @@ def _behind_tie(mesh, query, ways, ranks, line, reach, settings):
 def _traced(mesh, query, roots, field, settings):
     """Return ways (S, K, 3) from roots toward the tie, their distances (S, K) from it, and normals (S, K, 3).
 
-    A way ends a tie's radius before the tie; its last point is repeated.
+    A way ends at the hair of the tie; its last point is repeated.
     """
     directions = surface_distance.directions(mesh, field).astype(np.float32)
     place = np.asarray(roots, np.float64)
     found = query.nearest(place)
     longest = float(surface_distance.at(field, mesh, found).max())
-    near = 1.5 * settings.tie_radius
+    near = (1.0 if settings.shape == "CORNROWS" else 1.5) * settings.tie_radius
     step = max(longest / _STEPS, 1e-12)
     ways, apart, normals = [], [], []
     for _step in range(int(1.3 * _STEPS)):
