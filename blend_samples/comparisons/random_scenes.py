@@ -128,7 +128,7 @@ def by_cycles(values, curves, options):
     return pixels
 
 
-def path_traced(path, options):
+def path_traced(path, options, seed=1):
     """Return (H, W, 4) linear premultiplied pixels of the scene by Cycles; path: of a file that is deleted again."""
     blender_scene = bpy.context.scene
     render, cycles = blender_scene.render, blender_scene.cycles
@@ -137,7 +137,7 @@ def path_traced(path, options):
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode, render.image_settings.color_depth = "RGBA", "32"
     cycles.device = "CPU" if options.device == "CPU" else "GPU"
-    cycles.samples, cycles.seed = options.samples, 1
+    cycles.samples, cycles.seed = options.samples, seed
     cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = cycles.diffuse_bounces = 64
     cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0.0
