@@ -60,12 +60,12 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     most = MOST_TIMES * count
     starting = -(-len(seen.segments) // SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
-    sums, taken = light_paths.gather.gather(grid, surroundings_of(drawn), seen, starting, seed, most, tracing)
+    sums, taken, prior = light_paths.gather.gather(grid, surroundings_of(drawn), seen, starting, seed, most, tracing)
     if not taken:
         return drawn
 
     def texture_of(of_hair):
-        return light_grid.upload(light_paths.voxel_means.shares(of_hair, taken, grid.origin))
+        return light_grid.upload(light_paths.voxel_means.shares(of_hair, taken, grid.origin, prior))
 
     return lit_by(drawn, grid, light_paths.gather.of_each(texture_of, sums))
 

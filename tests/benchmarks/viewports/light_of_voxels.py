@@ -5,8 +5,8 @@
 
 Prints the error of means of 12 × 12 pixels in display levels of 255, the structural similarity, the ratio of mean
 colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS: factors of the number of paths, the weight of larger
-voxels in paths, and a factor of the number of voxels. Cycles' pictures are the means of two halves, whose difference is
-its own noise.
+voxels in paths (0: by the variance), and a factor of the number of voxels. Cycles' pictures are the means of two
+halves, whose difference is its own noise.
 """
 
 import argparse
@@ -30,10 +30,10 @@ from hair_addon.blender.settings import preferences
 from hair_addon.core.shading.light_paths import gather, strand_grid, voxel_means
 
 VARIANTS = (
-    *("1:128:1", "1:32:1", "1:8:1", "4:128:1", "4:32:1", "4:8:1"),
-    *("16:128:1", "16:32:1", "16:8:1", "64:32:1", "64:8:1", "64:8:8"),
+    *("1:128:1", "1:0:1", "1:32:1", "1:8:1", "4:128:1", "4:0:1", "4:32:1", "4:8:1"),
+    *("16:128:1", "16:0:1", "16:8:1", "64:0:1", "64:8:8"),
 )
-_followed = []
+_followed, _prior_of = [], voxel_means.prior_of
 _started = time.perf_counter()
 
 
@@ -107,7 +107,7 @@ def by_vellus(variant, options):
     square of its mean, number of paths) with the settings of a variant.
     """
     factor, prior, voxels = map(float, variant.split(":"))
-    voxel_means._PRIOR = prior
+    voxel_means.prior_of = (lambda _variance: prior) if prior else _prior_of
     blender_scene, depsgraph = bpy.context.scene, data_scene.present_depsgraph()
     size = (options.size, options.size)
     camera = data_scene.read_camera(blender_scene, depsgraph, *size)

@@ -125,10 +125,10 @@ def gather(
     seed: int = 0,
     most_paths: int = 0,
     progress: Progress = no_progress,
-) -> tuple[list[wp.array4d[wp.float64]], int]:
-    """Return ((Z, Y, X, 12) sums for each hair system, number of paths), on the device of the grid. The sums of a voxel
-    are RGB: over paths, their light and the light in uniform light; over the picture's samples, the light drawn without
-    paths and the light in uniform light.
+) -> tuple[list[wp.array4d[wp.float64]], int, float]:
+    """Return ((Z, Y, X, 12) sums for each hair system on the device of the grid, number of paths, weight of larger
+    voxels for `voxel_means.shares`). The sums of a voxel are RGB: over paths, their light and the light in uniform
+    light; over the picture's samples, the light drawn without paths and the light in uniform light.
 
     About `path_count` paths start on visible hair. Further passes add the number of paths that reduces the relative
     standard error of the mean light to 1.5 % by estimate, at most as many as before, up to `most_paths` in total: in
@@ -137,7 +137,7 @@ def gather(
     light = PathSums(grid, surroundings)
     light.see(seen)
     if not len(seen.segments):
-        return light.of_systems(), 0
+        return light.of_systems(), 0, light.prior
     tried, turn, more = 0, 0, path_count
     while True:
         light.follow(more, seed * _MOST_TURNS + turn, part_of(progress, tried / (tried + more), 1.0))
@@ -145,7 +145,7 @@ def gather(
         wanted = light.wanted  # factor of the number of paths
         more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
         if wanted < 1.0 or tried + more > most_paths:
-            return light.of_systems(), int(light.taken)
+            return light.of_systems(), int(light.taken), light.prior
 
 
 class PathSums:
@@ -211,6 +211,13 @@ class PathSums:
         """The factor of paths that, by estimate, reduces the relative standard error of the mean light to 1.5 %."""
         return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
 
+    @property
+    def prior(self) -> float:
+        """The weight of larger voxels, in paths, for `voxel_means.shares`."""
+        if self._total <= 0.0:
+            return voxel_means.MOST_PRIOR
+        return voxel_means.prior_of(_standard_error(self._total, self._squares, self.taken) ** 2 * self.taken)
+
     def _fade(self, weight):
         self._sums.scale(weight)
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
@@ -232,8 +239,8 @@ class PathSums:
             sums, taken = voxel_sums.VoxelSums(self.grid), taken + weight * former.taken
             sums.carry(self._sums, 1.0, 0.0)
             sums.carry(former._sums, weight, shift)
-        count = max(int(taken), 1)
-        return of_each(lambda of_hair: voxel_means.shares(of_hair, count, self.grid.origin), sums.of_systems())
+        count, origin, prior = max(int(taken), 1), self.grid.origin, self.prior
+        return of_each(lambda of_hair: voxel_means.shares(of_hair, count, origin, prior), sums.of_systems())
 
 
 def of_each(make: Callable[[Any], Any], values: Sequence[Any]) -> list[Any]:

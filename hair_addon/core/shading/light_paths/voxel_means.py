@@ -14,7 +14,8 @@ wp.set_module_options({"enable_backward": False})
 
 # RGB of four sums: light of paths, and the same in uniform light; drawn light, and the same in uniform light.
 CHANNELS = 12
-_PRIOR = 128.0  # weight of the ratio of larger voxels, in paths
+_CHANGE = 0.25  # assumed variance of the ratio between a voxel and larger ones, relative to its square
+_LEAST_PRIOR, MOST_PRIOR = 8.0, 128.0  # weight of the ratio of larger voxels, in paths
 _LEAST_VOXELS = 4096  # fewer are not worth a thread
 _MOST_PARTS = 512  # maximum number of parts of a sum
 
@@ -230,12 +231,25 @@ def _keep(
     out_shares[layer, row, column] = wp.vec4(float(light[0]), float(light[1]), float(light[2]), float(kept))
 
 
-def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
+def prior_of(variance: float) -> float:
+    """Return the weight of larger voxels, in paths, for light of paths with this variance relative to the square of its
+    mean: the weights of least error are inverse to the variances of a path and of the light between voxels.
+    """
+    return min(max(variance / _CHANGE, _LEAST_PRIOR), MOST_PRIOR)
+
+
+def shares(
+    sums: wp.array4d[wp.float64],
+    path_count: int,
+    origin: tuple[int, int, int] = (0, 0, 0),
+    prior: float = MOST_PRIOR,
+) -> np.ndarray:
     """Return shares of light (Z, Y, X, 4) float32 from sums (Z, Y, X, 12) of `gather` over some paths.
 
     The shares are RGB relative to the light in uniform light, and the fraction of the drawn light to keep; both
     together are the light of the paths. Drawn light distinguishes strands and places within a voxel. The fraction is
-    the best fit to the light of the paths, limited so that the kept light exceeds their light in no channel.
+    the best fit to the light of the paths, limited so that the kept light exceeds their light in no channel. origin,
+    prior: as for `smooth_ratios`.
     """
     require_count("sums", sums.shape[3], CHANNELS)
     with wp.ScopedDevice(sums.device):
@@ -244,7 +258,8 @@ def shares(sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int
         box = _box_of(sums)
         low = tuple(part.start for part in box)
         inner = sums[box]
-        ratios = _smooth(inner, path_count, tuple(one + before for one, before in zip(origin, low[::-1], strict=True)))
+        first = tuple(one + before for one, before in zip(origin, low[::-1], strict=True))
+        ratios = _smooth(inner, path_count, first, prior)
         _by_voxels(_keep, found, [ratios, _explained(inner), wp.vec3i(*low), found])
         return found.numpy()
 
@@ -259,20 +274,23 @@ def explained_part(sums: wp.array4d[wp.float64]) -> float:
 
 
 def smooth_ratios(
-    sums: wp.array4d[wp.float64], path_count: int, origin: tuple[int, int, int] = (0, 0, 0)
+    sums: wp.array4d[wp.float64],
+    path_count: int,
+    origin: tuple[int, int, int] = (0, 0, 0),
+    prior: float = MOST_PRIOR,
 ) -> np.ndarray:
     """Return ratios (Z, Y, X, 3 N) of light RGB to uniform light RGB, from sums (Z, Y, X, 6 N) over some paths,
     which have both N times.
 
     From large to small voxels, each ratio is blended with the ratio of the enclosing larger voxel, which has the weight
-    of `_PRIOR` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
+    of `prior` average paths. origin: index of the first voxel along X, Y, Z: voxels with an even index share a larger
     voxel with the next. Black without any light.
     """
     with wp.ScopedDevice(sums.device):
-        return _smooth(sums, path_count, origin).numpy()
+        return _smooth(sums, path_count, origin, prior).numpy()
 
 
-def _smooth(sums, path_count, origin):
+def _smooth(sums, path_count, origin, prior):
     """Return `smooth_ratios` as an array on the device."""
     levels, shifts, first = [sums], [], np.array(origin[::-1])
     while max(levels[-1].shape[:3]) > 1:
@@ -287,10 +305,10 @@ def _smooth(sums, path_count, origin):
     total, channels = levels[-1], sums.shape[3] // 2
     ratios = wp.empty((1, 1, 1, channels), dtype=wp.float64)
     kernel_cache.launch(_divide, channels, [total], [ratios], sums.device)
-    prior = wp.float64(_PRIOR / max(path_count, 1))
+    weight = wp.float64(prior / max(path_count, 1))
     for level, shift in zip(levels[-2::-1], reversed(shifts), strict=True):
         finer = wp.empty((*level.shape[:3], channels), dtype=wp.float64)
-        _by_voxels(_refine, finer, [level, shift, total, prior, ratios, finer])
+        _by_voxels(_refine, finer, [level, shift, total, weight, ratios, finer])
         ratios = finer
     return ratios
 

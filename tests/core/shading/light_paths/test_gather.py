@@ -73,7 +73,7 @@ def sun(axis, power=3.0):
 
 def gathered(*args, **details):
     """Return (systems, Z, Y, X, 12) sums and the number of paths."""
-    sums, taken = gather.gather(*args, **details)
+    sums, taken, _prior = gather.gather(*args, **details)
     return np.stack([of_hair.numpy() for of_hair in sums]), taken
 
 
@@ -492,6 +492,22 @@ def test_light_does_not_leak_past_the_edge_of_a_shadow(rng):
     assert found[:, :, 10:].mean(axis=(0, 1)).min() > 0.9
     assert found.mean() == pytest.approx(light.mean(), rel=0.05)
     assert np.square(found - is_lit).mean() < np.square(light - is_lit).mean() / 9.0
+
+
+@pytest.mark.parametrize(("relative_variance", "other"), [(1.0, 128.0), (25.0, 8.0)], ids=["calm", "noisy"])
+def test_the_noise_of_paths_decides_how_much_voxels_are_smoothed(rng, relative_variance, other):
+    """Calm light is smoothed less and noisy light more, so that each differs less from the light of endless paths than
+    with the smoothing of the other.
+    """
+    side, paths = 16, 32
+    expected = 1.0 + 0.7 * np.sin(np.arange(side))[:, None] * np.ones((side, side, side, 3))
+    noise = rng.gamma(paths / relative_variance, relative_variance / paths, (side, side, side, 1))
+    sums = by_voxel(np.concatenate([expected * noise, np.ones_like(expected)], axis=-1))
+    priors = voxel_means.prior_of(relative_variance), other
+    errors = [
+        np.square(voxel_means.smooth_ratios(sums, paths * side**3, prior=prior) - expected).mean() for prior in priors
+    ]
+    assert errors[0] < 0.8 * errors[1]
 
 
 def test_hair_has_the_same_light_in_a_grid_of_more_hair(rng):
