@@ -100,11 +100,12 @@ def mapped(given, settings):
 
 
 def without_effect(given, hair):
-    """Return the settings of styles in options that hair Curves do not have."""
+    """Return the settings of styles with a map or a curve that hair Curves do not have."""
     items = blender.settings.style_items
     styles = dict(zip(items.names_of(hair.vellus), items.styles_of(hair.vellus), strict=True))
     found = []
-    for setting in dict.fromkeys([*(one.setting for one in given.maps), *(setting for setting, _ in given.courses)]):
+    every = [*given.maps, *blender.settings.map_items.maps_of(hair.vellus)]
+    for setting in dict.fromkeys([*(one.setting for one in every), *(setting for setting, _ in given.courses)]):
         name, of_style = varied_settings.style_of(setting)
         if name and (name not in styles or varied_settings.details_of_style(styles[name], of_style) is None):
             found.append(setting)

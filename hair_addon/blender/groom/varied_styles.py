@@ -68,7 +68,11 @@ def read(
     for item in () if hair is None or len(names) != len(styles) else hair.vellus.maps:
         name, setting = varied_settings.style_of(item.setting)
         course = ramps.samples(item.course_tree)
-        if name not in names or not (map_items.is_set(item) or course is not None):
+        if not name or not (map_items.is_set(item) or course is not None):
+            continue
+        if name not in names:
+            sentence = 'The map of "{setting}" has no effect: the hair has no style "{style}".'
+            status = str(HairError(sentence, setting=item.setting, style=name))
             continue
         place = names.index(name)
         details = varied_settings.details_of_style(styles[place], setting)

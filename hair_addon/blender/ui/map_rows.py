@@ -8,7 +8,7 @@ from ...core.maps import varied_settings
 from ...core.styling import kinds
 from ..data.strands import curves
 from ..groom.styles import painted_maps
-from ..settings import map_items, ramp_nodes
+from ..settings import map_items, ramp_nodes, style_items
 from ..settings.translations import error_text
 
 _CHARACTERS = 44  # of a line of the popover
@@ -78,7 +78,19 @@ def _source_rows(layout, item, hair):
         layout.prop(item, "low")
         layout.prop(item, "high")
     layout.prop(item, "is_inverted")
+    if _value(hair.vellus, item.setting) == 0.0:
+        layout.label(text="The setting is 0: its map has no effect", icon="INFO")
     _map_ramp_rows(layout, item)
+
+
+def _value(state, setting):
+    """Return the value of a setting of hair or guides; None if they do not have it."""
+    section, _, name = setting.partition(".")
+    style, of_style = varied_settings.style_of(setting)
+    if style:
+        groups = [style_items.group_of(item) for item in state.styles if item.name == style]
+        return getattr(groups[0], of_style, None) if groups else None
+    return getattr(getattr(state, {"look": "appearance", "strands": "hair"}.get(section, section)), name, None)
 
 
 def _course_rows(layout, item):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps vary numbers of styles: each strand is as in hair whose style has the strand's value."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
+from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.styling import clump_trees
 from tests.support.pictures import drawn_strands
 from tests.support.pictures.gpu_strands import drawn, window  # noqa: F401
@@ -80,6 +83,17 @@ def test_each_half_has_the_curls_of_its_value(curls, scale):
     assert min(is_small.sum(), is_whole.sum()) > 0.3 * len(found)
     between = ~(is_small | is_whole)
     assert between.sum() < 0.2 * len(found)
+
+
+def test_a_map_of_a_missing_style_is_a_status(curls):
+    """A map or a curve of a style that the hair lacks, as from a settings file, is a status."""
+    wanted = replace(api.settings_of(curls), maps=(MapSettings(setting="styles.Crul.radius", kind="STRAND"),))
+    api.apply_settings(curls, wanted)
+    plain = points(curls)
+    assert 'no style "Crul"' in curls.vellus.status
+    api.clear_map(curls, "styles.Crul.radius")
+    np.testing.assert_array_equal(points(curls), plain)
+    assert curls.vellus.status == ""
 
 
 def test_maps_follow_their_style(curls):

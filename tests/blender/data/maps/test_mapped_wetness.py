@@ -11,8 +11,11 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.materials import wet_nodes
 from hair_addon.blender.render import hair_cache, offscreen
-from hair_addon.blender.settings import shared_wetness
+from hair_addon.blender.settings import map_items, shared_wetness
+from hair_addon.blender.ui import map_rows
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from hair_addon.core.maps.map_settings import MapSettings
+from tests.support.interface.layout import Layout
 from tests.support.pictures.gpu_strands import drawn, window  # noqa: F401
 
 SETTING = "look.wetness"
@@ -34,6 +37,16 @@ def wet(hair):
 def picture():
     settings = PictureSettings(width=32, height=32, samples_per_side=1, is_transparent=True)
     return offscreen.draw_picture(settings).astype(np.float64)
+
+
+def test_a_map_of_a_value_of_zero_says_so(wet):
+    """The rows of a map say that it has no effect while the setting is 0."""
+    item = map_items.keep(wet.vellus, MapSettings(setting=SETTING, kind="STRAND"))
+    for value, says in ((0.8, False), (0.0, True)):
+        wet.vellus.appearance.wetness = value
+        layout = Layout()
+        map_rows.draw(layout, item, wet)
+        assert ("The setting is 0: its map has no effect" in layout.texts) == says
 
 
 def test_a_map_multiplies_the_wetness_of_each_strand(wet):

@@ -122,6 +122,16 @@ def test_a_map_and_a_curve_multiply(curls):
     np.testing.assert_array_equal(points(curls), both)
 
 
+def test_curves_of_many_points_are_copied(curls):
+    """A curve that Blender's widget may have, of a hundred points, is copied with its style and by settings."""
+    many = " ".join(f"{place / 128:g}:{place % 2}" for place in range(129))
+    api.set_course(curls, RADIUS, many)
+    assert bpy.ops.vellus.duplicate_style() == {"FINISHED"}
+    assert [one.course for one in api.maps_of(curls)] == [many, many]
+    api.apply_settings(curls, api.settings_of(curls))
+    assert [one.course for one in api.maps_of(curls)] == [many, many]
+
+
 def test_an_opened_popover_and_a_removed_curve_of_an_amount_change_nothing(curls):
     """The amount, which maps cannot vary, may have an item without a curve: copies and settings keep it."""
     plain, name = points(curls), "styles.Curl.amount"
