@@ -370,7 +370,7 @@ def test_nothing_from_a_file_can_become_code(path):
     ] == []
     # Words that start processes come from the user's own command line, or from this package, in one place each.
     # And the system is asked for its free memory in one, by calls in which nothing is from a file.
-    allowed = {"command_line/helpers.py": {"subprocess"}, "blender/host/other_process.py": {"subprocess"}}
+    allowed = {"command_line/helpers.py": {"subprocess"}, "blender/host/background_process.py": {"subprocess"}}
     allowed |= {"blender/host/system_memory.py": {"ctypes"}}
     forbidden = set(FORBIDDEN_MODULES) - allowed.get(name_of(path), set())
     assert import_lines(path, *forbidden) == []

@@ -9,7 +9,7 @@ import bpy
 from ..core.errors import HairError
 from . import manual
 from .groom.systems import hair_systems
-from .host import running
+from .host import background_process, running
 from .live import first_setup, handlers, invalidation
 from .render.frames import engine
 from .render.viewport import viewport
@@ -104,6 +104,7 @@ def _show_in_status_bars(text):
 
 def _unregister():
     running.end(bpy.context)
+    background_process.end()
     first_setup.unregister()
     viewport.unregister()
     handlers.unregister()

@@ -84,7 +84,7 @@ _OPERATORS = {
     "use_as_hair": ("use_as_hair", "import_groom", "convert_particles"),
     "mesh_to_hair": ("mesh_to_hair",),
     "transfer_groom": ("transfer_groom",),
-    "rendering": ("toggle_composite",),
+    "rendering": ("toggle_composite", "retry_baking"),
     "cards": ("hair_cards", "hair_tubes"),
     "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }

@@ -9,7 +9,7 @@ from mathutils import Euler, Matrix
 
 from ...core.errors import HairError
 from ...core.imaging import lamps
-from ..data.pictures import light_linking, light_panoramas, world_panoramas
+from ..data.pictures import light_linking, light_panoramas, picture_jobs, world_panoramas
 from ..data.pictures.rendered_instances import is_rendered
 from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
@@ -228,7 +228,7 @@ def _panorama_of(world, time, waits):
         say(str(error))
         path = None
     else:
-        path = path or world_panoramas.last_of(world)
+        path = path or picture_jobs.last_of(world)
     if path is None:
         return World(np.array(world.color))
     return World(np.ones(3), image_of(str(path)), np.eye(4))

@@ -9,11 +9,11 @@ from ..data.maps import image_pixels, sources
 from ..data.pictures import (
     drawn_meshes,
     light_panoramas,
+    picture_jobs,
     root_colors,
     surface_bakes,
     surface_means,
     unread_nodes,
-    world_panoramas,
 )
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
@@ -24,7 +24,7 @@ from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states, outside_guides
 from ..groom.surfaces import edited_faces
 from ..groom.systems import copied_hair
-from ..host import notices
+from ..host import background_process, notices
 from ..layers import recording
 from ..render import hair_cache, modified_hair, solid_hair
 from ..render.frames import composite
@@ -114,12 +114,10 @@ OTHERS = (
     surface_shading.baked_cache,
     surface_textures.surface_cache,
     notices.printed_cache,
-    surface_bakes.process_cache,
     surface_bakes.bake_cache,
-    surface_bakes.last_cache,
     light_panoramas.picture_cache,
-    world_panoramas.process_cache,
-    world_panoramas.last_cache,
+    picture_jobs.job_cache,
+    picture_jobs.last_cache,
     guide_lines.hue_cache,
 )
 
@@ -145,6 +143,7 @@ def clear():
 
 def end():
     """Clear all caches and programs when Python ends, while the GPU context still exists."""
+    background_process.end()
     live_light.end()
     for cache in CACHES:
         cache.clear()

@@ -28,3 +28,13 @@ def read_layers(path: str | Path) -> dict[str, np.ndarray]:
     if not layers:
         raise HairError("{path} has no colors: pick another image.", path=path)
     return layers
+
+
+def write_colors(path: str | Path, colors: np.ndarray) -> None:
+    """Write (H, W, 3) scene-linear colors, bottom row first, as float32. Raises `OSError`."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    pixels = np.ascontiguousarray(colors[::-1], np.float32)
+    try:
+        OpenEXR.File(header, {"RGB": pixels}).write(str(path))
+    except RuntimeError as error:
+        raise OSError(str(error)) from error

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lights whose nodes Cycles renders arrive at hair as in Cycles, and are rendered again only if nodes change."""
 
-import json
-
 import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from hair_addon.blender.data.pictures import light_panoramas, world_panoramas
+from hair_addon.blender.data.pictures import light_panoramas, picture_jobs, world_panoramas
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.io.pictures import light_panorama
 
@@ -136,8 +134,8 @@ def test_light_of_nodes_arrives_as_in_cycles(scene, tmp_path, monkeypatch, name)
     lamp = add_light(scene, kind, matrix, nodes)
     options = []
 
-    def kept_or_rendered(light, path, frame, waits, words):
-        options.append(words)
+    def kept_or_rendered(_kind, light, _path, _waits, frame, matrix):
+        options.append(matrix)
         bpy.data.libraries.write(str(tmp_path / "light.blend"), {light.original}, fake_user=True)
 
     monkeypatch.setattr(world_panoramas, "kept_or_rendered", kept_or_rendered)
@@ -147,10 +145,7 @@ def test_light_of_nodes_arrives_as_in_cycles(scene, tmp_path, monkeypatch, name)
     shone = by_cycles(scene, matrix, tmp_path)
     without_nodes(lamp.data)
     shone /= by_cycles(scene, matrix, tmp_path)
-    if name.endswith("IES"):
-        monkeypatch.setattr(light_panorama, "SAMPLES", 4)
-        monkeypatch.setattr(light_panorama, "SIZE", (128, 64))
-    light_panorama.render(tmp_path / "light.blend", "Lamp", json.loads(options[0][1]), 1.0, tmp_path / "light.npz")
+    light_panorama.render(tmp_path / "light.blend", "Lamp", options[0], 1.0, False, tmp_path / "light.npz")
     factor = light_panoramas._read(tmp_path / "light.npz").factor(place, PLACE)
     np.testing.assert_allclose(factor, shone, rtol=0.02)
 
@@ -180,9 +175,9 @@ def test_another_process_renders_a_light_once(scene):
         return found["power"][:3]
 
     lit = power()
-    path = world_panoramas.last_of(lamp.data)
+    path = picture_jobs.last_of(lamp.data)
     lamp.location.x = 0.5
     np.testing.assert_allclose(power(), lit, rtol=0.01)
-    assert world_panoramas.last_of(lamp.data) == path
+    assert picture_jobs.last_of(lamp.data) == path
     without_nodes(lamp.data)
     np.testing.assert_allclose(lit / power(), (1.2, 1.4, 1.9), rtol=0.01)

@@ -11,11 +11,13 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import kept_files, world_digest, world_panoramas
+from hair_addon.blender.data.pictures import kept_files, picture_jobs, world_digest, world_panoramas
 from hair_addon.blender.gpu import ambient_visibility, lights, strand_textures, surface_textures, world_texture
-from hair_addon.blender.host import cli_command
+from hair_addon.blender.host import background_process, cli_command
+from hair_addon.blender.io.pictures import world_panorama
 from hair_addon.blender.render import offscreen
 from hair_addon.core.errors import HairError
+from hair_addon.core.files import light_images
 from hair_addon.core.imaging import environment
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
@@ -155,7 +157,7 @@ def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path, monkeypatch):
     rotation, camera_part = mixed_world(scene)
     unrolled = world_texture.picture_of(lights.read_world(scene))
     made = world_panoramas.file_of(scene.world, 1.0, waits=False)
-    assert made is not None and not len(world_panoramas.process_cache)
+    assert made is not None and not picture_jobs.running()
     rotation.default_value = (0.4, 0.2, 1.5)
     assert world_digest.digest_of(scene.world) != made.stem
     rotation.default_value = (0.4, 0.2, 1.0)
@@ -164,6 +166,30 @@ def test_cycles_renders_a_world_of_other_nodes(scene, tmp_path, monkeypatch):
     camera_part.default_value = 0.0
     rendered = panorama(scene, tmp_path)
     np.testing.assert_allclose(unrolled, rendered, rtol=0.02, atol=0.01)
+
+
+@pytest.mark.farm
+def test_the_sun_of_a_sky_has_all_its_light(scene, tmp_path, monkeypatch):
+    """The light of a sky with a sun is within 1 % of that with many samples, also in the first picture of views."""
+    scene.world = bpy.data.worlds.new("World")
+    sky = scene.world.node_tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_rotation = 0.4, 2.0
+    scene.world.node_tree.links.new(sky.outputs[0], scene.world.node_tree.nodes["Background"].inputs["Color"])
+    bpy.data.libraries.write(str(tmp_path / "sky.blend"), {scene.world})
+    name = scene.world.name
+
+    def light(is_coarse):
+        world_panorama.render(tmp_path / "sky.blend", name, 1.0, is_coarse, tmp_path / "sky.exr")
+        colors = light_images.read_layers(tmp_path / "sky.exr")[""].astype(float)
+        widths = np.cos(np.pi * ((np.arange(len(colors)) + 0.5) / len(colors) - 0.5))
+        return np.einsum("h,hwc->c", widths, colors) / len(colors) ** 2
+
+    coarse, fine = light(True), light(False)
+    monkeypatch.setattr(world_panorama, "SUN_SAMPLES", 2048)
+    monkeypatch.setattr(world_panorama, "_AROUND_SUN", 8)
+    exact = light(False)
+    np.testing.assert_allclose(fine, exact, rtol=0.01)
+    np.testing.assert_allclose(coarse, exact, rtol=0.01)
 
 
 @pytest.mark.farm
@@ -193,62 +219,74 @@ def test_the_digest_of_a_world_does_not_depend_on_the_order_of_its_links(scene):
     assert world_digest.digest_of(scene.world) == before
 
 
-def test_a_view_has_one_process_while_nodes_change(scene, monkeypatch):
-    """While nodes change with each step of a slider, a view starts one process at a time."""
+@pytest.fixture
+def other_blender(monkeypatch):
+    """Let other code run in place of the background process."""
+
+    def run(code):
+        background_process.end()
+        monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", code])
+
+    yield run
+    background_process.end()
+
+
+SLEEP = "import time; time.sleep(60)"
+FAIL = "raise SystemExit('no Cycles')"
+
+
+def test_a_view_has_one_job_while_nodes_change(scene, monkeypatch, other_blender):
+    """While nodes change with each step of a slider, a view starts one job at a time."""
     rotation, _part = mixed_world(scene)
-    started = []
-    real = world_panoramas.OtherProcess
-
-    def start(*arguments):
-        started.append(real(*arguments))
-        return started[-1]
-
-    monkeypatch.setattr(world_panoramas, "OtherProcess", start)
-    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    sent = []
+    monkeypatch.setattr(background_process._Process, "send", lambda _self, folder: sent.append(folder))
+    other_blender(SLEEP)
     for angle in (0.11, 0.12, 0.13):
         rotation.default_value = (angle, 0.0, 0.0)
         assert world_panoramas.file_of(scene.world, 1.0, waits=False) is None
-    assert len(started) == 1
-    started[0].wait(0.0)
-    assert world_panoramas.look() is None
+    assert len(sent) == 1 and not picture_jobs.has_failed()
+    (sent[0] / background_process.ENDED).write_text("too bright")
+    assert picture_jobs.look() is None
+    assert picture_jobs.has_failed()
     assert world_panoramas.file_of(scene.world, 1.0, waits=False) is None
-    assert len(started) == 2
-    started[1].wait(0.0)
-    assert world_panoramas.look() is None
+    assert len(sent) == 2
 
 
-def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, monkeypatch):
+def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_blender):
     """Until Cycles has rendered other nodes, the world has its viewport color, which it keeps with a message after an
-    error.
+    error. Panels name the error, and start again.
     """
     mixed_world(scene)[0].default_value = (0.1, 0.0, 0.0)
-    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
+    other_blender(FAIL)
     for _look in range(200):
         np.testing.assert_allclose(lights.read_world(scene, waits=False).color, (0.1, 0.2, 0.3), rtol=1e-6)
-        if world_panoramas.look() is None:
+        if picture_jobs.look() is None:
             break
         time.sleep(0.05)
+    ((sentence, is_error),) = picture_jobs.sentences()
+    assert is_error and "no Cycles" in sentence
     with pytest.raises(HairError, match=r"World.*no Cycles"):
         lights.read_world(scene)
+    bpy.ops.vellus.retry_baking()
+    assert not picture_jobs.sentences() and not bpy.ops.vellus.retry_baking.poll()
+    other_blender(SLEEP)
+    lights.read_world(scene, waits=False)
+    assert [is_error for _sentence, is_error in picture_jobs.sentences()] == [False]
 
 
-def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, monkeypatch):
+def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, other_blender):
     """A view shows the last panorama until the next is rendered, and panels name the world that is being rendered."""
     rotation, _part = mixed_world(scene)
     rotation.default_value = (0.21, 0.0, 0.0)
     former = kept_files.folder("worlds") / f"{world_digest.digest_of(scene.world)}.exr"
     former.write_bytes(b"")
     assert lights.read_world(scene, waits=False).image.path == str(former)
-    assert not world_panoramas.sentences()
-    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    assert not picture_jobs.sentences()
+    other_blender(SLEEP)
     rotation.default_value = (0.22, 0.0, 0.0)
     assert lights.read_world(scene, waits=False).image.path == str(former)
-    (sentence,) = world_panoramas.sentences()
-    assert '"World"' in sentence
-    (rendering,) = world_panoramas.process_cache.values()
-    rendering._process.wait(0.0)
-    world_panoramas.look()
-    assert not world_panoramas.sentences()
+    ((sentence, is_error),) = picture_jobs.sentences()
+    assert '"World"' in sentence and not is_error
     former.unlink()
     assert lights.read_world(scene, waits=False).image is None
 

@@ -9,9 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon import command_line
-from hair_addon.blender.data.pictures import drawn_meshes, kept_files, surface_bakes, unread_nodes
-from hair_addon.blender.host import cli_command
+from hair_addon.blender.data.pictures import drawn_meshes, kept_files, picture_jobs, surface_bakes, unread_nodes
+from hair_addon.blender.host import background_process, cli_command
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.pictures.rendering import add_orthographic_camera
@@ -125,7 +124,7 @@ def test_baked_surfaces_are_as_in_cycles(stage, tmp_path):
         (mesh,) = (one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.to_world[2, 3] == 0.0)
         ((_count, color),) = mesh.colors
         np.testing.assert_allclose(mesh.triangle_materials[:, :3].mean(axis=0), color, rtol=0.02)
-    assert not surface_bakes.sentences()
+    assert not picture_jobs.sentences()
 
 
 def plain_color(name, color):
@@ -150,15 +149,15 @@ def linked_wall(name, color, path):
 
 @pytest.mark.farm
 def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
-    """One process bakes objects with several materials and drivers, linked objects, objects with custom properties, and
+    """One job bakes objects with several materials and drivers, linked objects, objects with custom properties, and
     images with unsaved pixels; copies are baked once. An object that cannot be baked leaves the others as they are, and
     removed pictures are baked again.
     """
-    baked, start = [], surface_bakes._Baking.__init__
+    baked, start = [], picture_jobs.PictureJob.__init__
     monkeypatch.setattr(
-        surface_bakes._Baking,
+        picture_jobs.PictureJob,
         "__init__",
-        lambda self, objects, *how: (baked.append(len(objects)), start(self, objects, *how))[1],
+        lambda self, kind, objects, values: (baked.append(len(objects)), start(self, kind, objects, values))[1],
     )
     (red, value), (blue, _value), (gray, factor) = (
         plain_color(name, color)
@@ -201,7 +200,7 @@ def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
     np.testing.assert_allclose(found[dirty.session_uid], [(0.2, 0.2, 0.2)], atol=1e-3)
     np.testing.assert_allclose(found[painted.session_uid], [(0.1, 0.2, 0.3)], atol=1e-3)
     assert baked == [5]
-    (sentence,) = surface_bakes.sentences()
+    ((sentence, _is_error),) = picture_jobs.sentences()
     assert full.name in sentence and "UV maps" in sentence
     paint((0.3, 0.1, 0.2))
     dirty["dirt"] = 1.0
@@ -232,7 +231,7 @@ def test_files_in_use_are_kept(tmp_path, monkeypatch):
 
 
 def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
-    """A view starts one process for all surfaces. Until it ends, and after an error, the view has plain colors and a
+    """A view starts one job for all surfaces. Until it ends, and after an error, the view has plain colors and a
     sentence.
     """
     placed = wall(bricks())
@@ -241,27 +240,21 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
         next(iter(one.node_tree.nodes)).name = one.name  # nodes of no other test
     principled = next(one for one in placed.active_material.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
     principled.inputs["Base Color"].default_value = (0.2, 0.3, 0.4, 1.0)
+    background_process.end()
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "raise SystemExit('no Cycles')"])
     depsgraph = bpy.context.evaluated_depsgraph_get()
     objects = [one.evaluated_get(depsgraph) for one in stage.objects if one.type == "MESH"]
     assert surface_bakes.find(objects, None, 1.0, for_render=False, waits=False) == {}
-    (process,) = set(surface_bakes.process_cache.values())
-    assert len(process.names) == len(surface_bakes.sentences()) == 2
+    assert len(picture_jobs.running()) == 1 and len(picture_jobs.sentences()) == 2
     for _look in range(200):
-        if surface_bakes.look() is None:
+        if picture_jobs.look() is None:
             break
         time.sleep(0.05)
     assert surface_bakes.find(objects, None, 1.0, for_render=False, waits=False) == {}
-    assert all("no Cycles" in sentence for sentence in surface_bakes.sentences())
-    assert len(set(surface_bakes.process_cache.values())) == 1
+    assert all(is_error and "no Cycles" in sentence for sentence, is_error in picture_jobs.sentences())
+    assert not picture_jobs.running() and len(picture_jobs.sentences()) == 2
     mesh = next(one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.owner[0] == placed.session_uid)
     np.testing.assert_allclose(mesh.colors[0][1], (0.2, 0.3, 0.4), rtol=1e-6)
-
-
-def test_the_other_process_knows_its_commands():
-    for verb in ("panorama", "bake_surfaces"):
-        words = [verb, "a.blend", "--out", "b", *(["--sources", "[]"] if verb == "bake_surfaces" else ["--name", "c"])]
-        assert callable(command_line.parser("vellus").parse_args(words).run)
 
 
 def test_instances_of_geometry_nodes_are_read_in_turn(stage, monkeypatch):

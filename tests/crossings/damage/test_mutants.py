@@ -51,10 +51,11 @@ OTHERS = {
     "core/kernels/kernel_entries.py": "compared with a digest: test_kernel_cache.py",
     "core/kernels/native_code.py": "the add-on's own sources",
     # Written by this process, or by another for it, and read at once.
-    "blender/host/other_process.py": "the errors of a process that it started",
+    "blender/host/background_process.py": "the errors of a process that it started",
+    "blender/data/pictures/picture_jobs.py": "the reasons that another process has written for it",
     "blender/data/pictures/unsaved_images.py": "pixels that another process has written for it",
     "blender/data/pictures/surface_bakes.py": "pictures that another process has written; damaged ones are removed",
-    "command_line/background.py": "names from the process that runs it",
+    "blender/io/pictures/background_jobs.py": "jobs of the process that started it",
     "blender/io/pictures/surface_bake.py": "the surfaces that another process has written for it",
     "blender/data/pictures/light_panoramas.py": "panoramas that another process has written; damaged ones are removed",
     "blender/io/pictures/light_panorama.py": "the light that another process has written for it",

@@ -2,14 +2,13 @@
 """Light of lamps whose nodes Vellus does not read: Cycles renders a panorama of it once, and hair receives its mean."""
 
 import hashlib
-import json
 import zipfile
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...host.caches import Cache
-from . import kept_files, unread_nodes, world_digest, world_panoramas
+from . import kept_files, picture_jobs, unread_nodes, world_digest, world_panoramas
 from .shader_sockets import nodes_of
 
 picture_cache = Cache(capacity=64)  # path → `Panorama`
@@ -71,8 +70,8 @@ def find(light, matrix, frame, waits):
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
     found.update(repr((rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
-    options = ["--matrix", json.dumps(rows)]
-    path = world_panoramas.kept_or_rendered(light, path, frame, waits, options) or world_panoramas.last_of(light)
+    made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
+    path = made or picture_jobs.last_of(light)
     return None if path is None else picture_cache.get(path, lambda: _read(path))
 
 

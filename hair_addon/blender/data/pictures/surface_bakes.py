@@ -5,30 +5,18 @@ Pictures of an object are stored under the digest of its materials and its mesh.
 """
 
 import hashlib
-import json
-import tempfile
 import zipfile
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-import bpy
 import numpy as np
 
-from ....core.errors import cause_of
 from ...host.caches import Cache
-from ...host.notices import name_of, say
-from ...host.other_process import OtherProcess
-from ...settings.translations import interface_text
+from ...host.notices import say
 from .. import scene
-from . import kept_files, surface_materials, unread_nodes, unsaved_images, world_digest, world_panoramas
+from . import kept_files, picture_jobs, surface_materials, unread_nodes, world_digest
 from .shader_sockets import nodes_of
 
-_PATIENCE = 600.0  # [s] for all surfaces of a scene
-_LOOK = 0.25  # [s] between checks of processes
-
-process_cache = Cache()  # digest → `_Baking`: running, or failed
 bake_cache = Cache(capacity=16)  # path → `Bake`, of 20 to 150 MB
-last_cache = Cache()  # session_uid of an object → path of its last pictures, with any materials
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,65 +78,14 @@ class Bake:
         return tuple(float(one[row, column].mean(dtype=np.float64)) for one in (self.metallic, self.weight))
 
 
-class _Baking:
-    """A process that bakes objects: {path of the pictures: original object}.
-
-    reasons: {path: why the object cannot be baked}.
-    """
-
-    def __init__(self, objects, frame, for_render):
-        self.reasons, self._names = {}, {path: name_of(one) for path, one in objects.items()}
-        sources = [(world_panoramas.library_of(one), one.name) for one in objects.values()]
-        words = ["--sources", json.dumps(sources), "--frame", repr(frame), *(["--for-render"] if for_render else [])]
-        try:
-            parent = next(iter(objects)).parent
-            self._folder = tempfile.TemporaryDirectory(prefix=".", dir=parent, ignore_cleanup_errors=True)
-            folder = Path(self._folder.name)
-            blend, local = folder / "surfaces.blend", {one for one in objects.values() if one.library is None}
-            bpy.data.libraries.write(str(blend), local, path_remap="ABSOLUTE", fake_user=True)
-            materials = {slot.material for one in local for slot in one.material_slots if slot.material is not None}
-            unsaved_images.write(folder, [one.node_tree for one in materials if one.node_tree is not None])
-            self._process = OtherProcess(["bake_surfaces", str(blend), "--out", str(folder), *words], folder / "errors")
-        except (OSError, RuntimeError) as error:
-            self._process, self.reasons = None, dict.fromkeys(objects, cause_of(error))
-
-    @property
-    def is_running(self):
-        """Whether the process runs, or its end has not been handled yet."""
-        return self._process is not None
-
-    @property
-    def names(self):
-        """Names of the objects that are being baked or cannot be baked, with the reason or an empty text."""
-        shown = self._names if self.is_running else self.reasons
-        return [(self._names[path], self.reasons.get(path, "")) for path in shown]
-
-    def is_ended(self, waits):
-        """Whether the process has ended; waits: wait for its end. Then the files are in place, or there is a reason."""
-        if self._process is not None and waits:
-            self._process.wait(_PATIENCE)
-        if self._process is None or self._process.is_running:
-            return self._process is None
-        complaint, self._process = self._process.complaint(), None
-        for index, path in enumerate(self._names):
-            made = Path(self._folder.name) / f"{index}.npz"
-            try:
-                made.replace(path)
-            except OSError as error:
-                refusal = made.with_suffix(".txt")
-                told = refusal.read_text("utf-8") if refusal.is_file() else complaint
-                self.reasons[path] = told or cause_of(error)
-        self._folder.cleanup()
-        return True
-
-
 def find(objects, override, frame, for_render, waits):
     """Return {session_uid of a mesh object: `Bake`} of those of the evaluated objects whose materials need one.
 
     objects: read in turn, as Blender frees the objects of some instances when the next instance is read.
 
     override: the view layer's material; frame: the time of drivers of nodes; waits: return only when all are baked.
-    Without `waits`, the most recent pictures of an object, if there are any, are used until its new pictures are baked.
+    Without `waits`, the most recent pictures of an object, if there are any, are used until new coarse pictures are
+    baked, and the coarse ones until the fine pictures are.
     """
     paths, originals = {}, {}
     for one in objects:
@@ -156,18 +93,14 @@ def find(objects, override, frame, for_render, waits):
         if uid not in paths and _needs_bake(one, override):
             paths[uid] = _path_of(one)
             originals[paths[uid]] = one.original  # linked objects have common pictures
-    missing = {path: one for path, one in originals.items() if not path.is_file()}
-    _start({path: one for path, one in missing.items() if not _is_known(path)}, frame, for_render, waits)
-    for path, one in missing.items():
-        baking = process_cache.get(path.stem)
-        if baking is not None and baking.is_ended(waits) and path in baking.reasons:
-            say(f'Cycles cannot bake the materials of "{name_of(one)}": {baking.reasons[path]}')
-    if missing and paths:
-        kept_files.remove_oldest(next(iter(paths.values())), used=set(paths.values()))
+    files, errors = picture_jobs.files_of("surfaces", originals, waits, frame=float(frame), for_render=for_render)
+    for error in errors:
+        say(str(error))
     bake_cache.make_room(len(paths))
     found = {}
     for uid, path in paths.items():
-        path = last_cache.keep(uid, path) if path.is_file() else last_cache.get(uid)
+        made, last = files.get(path), picture_jobs.last_cache
+        path = last.get(uid) if made is None else last.keep(uid, made)
         if path is not None and path.is_file():
             found[uid] = bake_cache.get(path, lambda path=path: _read(path))
     return {uid: bake for uid, bake in found.items() if bake is not None}
@@ -185,49 +118,6 @@ def add_uv_map(mesh, name, uvs):
     layer = mesh.uv_layers[name]
     layer.active = True
     return layer
-
-
-def _is_known(path):
-    """Whether pictures without a file are being baked or cannot be baked."""
-    baking = process_cache.get(path.stem)
-    return baking is not None and (baking.is_running or path in baking.reasons)
-
-
-def _start(objects, frame, for_render, waits):
-    """Start a process for {path: object}. Viewports have at most one at a time, as nodes may change in each frame."""
-    if not objects or (not waits and _running()):
-        return
-    baking = _Baking(objects, frame, for_render)
-    for path in objects:
-        process_cache.keep(path.stem, baking)
-    if not waits and not bpy.app.timers.is_registered(look):
-        bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
-
-
-def look():
-    """Timer: show finished pictures. Returns the time to the next check [s], None after the last."""
-    running = _running()
-    ended = [one.is_ended(waits=False) for one in running]
-    if any(ended):
-        for material in bpy.data.materials:
-            material.update_tag()
-        world_panoramas.redraw_panels()
-    return _LOOK if _running() else None
-
-
-def sentences():
-    """Translated sentences for panels, about surfaces whose bake is running or has failed."""
-    text = 'Cycles is baking the materials of "{name}". Until then, their previous pictures or plain colors are shown.'
-    failed = 'Cycles cannot bake the materials of "{name}": {reason}'
-    found = []
-    for baking in dict.fromkeys(process_cache.values()):
-        for name, reason in baking.names:
-            found.append(interface_text(text if baking.is_running else failed, name=name, reason=reason))
-    return found
-
-
-def _running():
-    return list({one: None for one in process_cache.values() if one.is_running})
 
 
 def _needs_bake(mesh_object, override):

@@ -14,7 +14,8 @@ from ...host import scene_time
 from . import world_panorama
 
 SIZE = 256, 128  # pixels
-SAMPLES = 32  # per pixel
+COARSE_SIZE = 64, 32  # of the first picture of views
+SAMPLES = 8  # per pixel
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
 _ENERGY = 1e6  # of the light, for pixels of about one
 
@@ -22,11 +23,12 @@ _ENERGY = 1e6  # of the light, for pixels of about one
 _PLAIN = {"color": (1.0, 1.0, 1.0), "use_temperature": False, "exposure": 0.0, "energy": _ENERGY, "use_shadow": False}
 
 
-def render(path, name, matrix, frame, out):
+def render(path, name, matrix, frame, is_coarse, out):
     """Render a light of a .blend, turned and placed by a matrix (4, 4), at a frame into an .npz. Raises `HairError`.
 
     `lit` (H, W, 3) and `plain` (H, W): radiance of a white sphere around the light with its nodes and without them, in
-    directions of the light's own axes, from below to above. A sun lights the sphere through its wall.
+    directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse:
+    render a small picture, which is soon ready.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -51,29 +53,18 @@ def render(path, name, matrix, frame, out):
     camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
     size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
     camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
-    world_panorama.set_up(scene, SAMPLES, SIZE)
+    world_panorama.set_up(scene, SAMPLES, COARSE_SIZE if is_coarse else SIZE)
     scene.cycles.max_bounces = 0
     scene_time.go_to_time(scene, frame)
     part = Path(out).with_suffix(".part.exr")
-    lit = _picture(scene, part)
+    lit = world_panorama.picture(scene, part)
     emission = tree.nodes.new("ShaderNodeEmission")
     emission.inputs["Strength"].default_value = 1.0
     tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
-    plain = _picture(scene, part)
+    plain = world_panorama.picture(scene, part)
     np.savez(part.with_suffix(".npz"), lit=lit, plain=plain.mean(axis=-1))
     part.unlink()
     os.replace(part.with_suffix(".npz"), out)
-
-
-def _picture(scene, path):
-    """Render (H, W, 3) float32, the lowest row first."""
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-    image = bpy.data.images.load(str(path), check_existing=False)
-    pixels = np.empty(4 * SIZE[0] * SIZE[1], np.float32)
-    image.pixels.foreach_get(pixels)
-    bpy.data.images.remove(image)
-    return pixels.reshape(SIZE[1], SIZE[0], 4)[..., :3]
 
 
 def _add_sphere(radius, center):

@@ -16,6 +16,7 @@ from ...host import scene_time
 
 SIDE = 1024  # texels along a side of a picture; more for meshes with many faces
 IMAGE_SIDE = 2048  # the same for materials with images
+COARSE_SIDE = 256  # the same for the first pictures of views
 _MARGIN = 2  # texels
 _ATLAS = "vellus_atlas"
 _LARGEST = 6e4  # of half floats
@@ -37,11 +38,12 @@ _COLORS = {
 _OTHERS = {"BSDF_TRANSPARENT": 0.0, "BSDF_GLASS": 0.0, "BSDF_REFRACTION": 0.0, "HOLDOUT": 0.0, "EMISSION": 1.0}
 
 
-def bake(path, sources, frame, for_render, out):
+def bake(path, sources, frame, for_render, is_coarse, out):
     """Bake the materials of meshes at a frame into .npz files OUT/0.npz, …; OUT/0.txt, … are the reasons why a mesh
     cannot be baked. Raises `HairError` if files cannot be read.
 
-    sources: (path of the library of a linked object, or "" for the .blend at `path`; name of the object) of each mesh.
+    sources: (path of the library of a linked object, or "" for the .blend at `path`; name of the object) of each mesh;
+    is_coarse: bake small pictures, which are soon ready.
     Modifiers that only deform are turned off, so that patterns stay in place on posed surfaces. Each file has `uvs`
     (C, 2) of the mesh's corners; float16 `color` (H, W, 3), `roughness`, `metallic` and `weight` (H, W), which is the
     opaque part; `normal` (H, W, 3) in tangent space, encoded from 0 to 1, empty without nodes of normals.
@@ -62,9 +64,10 @@ def bake(path, sources, frame, for_render, out):
         try:
             if found is None:
                 raise HairError("The file of its library does not contain it.")
-            baked = _bake_object(scene, found)
+            baked = _bake_object(scene, found, is_coarse)
         except (HairError, RuntimeError) as error:  # other objects are still baked
-            (Path(out) / f"{index}.txt").write_text(cause_of(error), "utf-8")
+            reason = str(error) if isinstance(error, HairError) else cause_of(error)
+            (Path(out) / f"{index}.txt").write_text(reason, "utf-8")
             continue
         made = Path(out) / f"{index}.part.npz"
         with made.open("wb") as file:
@@ -115,7 +118,7 @@ def _rest(found, for_render):
             modifier.show_viewport = False
 
 
-def _bake_object(scene, found):
+def _bake_object(scene, found, is_coarse):
     """Return {name: array} of the baked materials of an object."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = found.evaluated_get(depsgraph)
@@ -129,9 +132,8 @@ def _bake_object(scene, found):
         mesh.materials[index] = None if slot.material is None else slot.material.original.copy()
     materials = [material for material in mesh.materials if material is not None]
     has_images = any(node.type == "TEX_IMAGE" for one in materials for node in nodes_of(one.node_tree))
-    uvs, side = face_atlas.face_atlas(
-        blender_data.faces_of(mesh), blender_data.vertex_positions(mesh), IMAGE_SIDE if has_images else SIDE
-    )
+    side = COARSE_SIDE if is_coarse else IMAGE_SIDE if has_images else SIDE
+    uvs, side = face_atlas.face_atlas(blender_data.faces_of(mesh), blender_data.vertex_positions(mesh), side)
     if surface_bakes.add_uv_map(mesh, _ATLAS, uvs) is None:
         raise HairError("It has the maximum number of UV maps: remove one.")
     target = bpy.data.images.new("Baked", side, side, float_buffer=True, is_data=True)

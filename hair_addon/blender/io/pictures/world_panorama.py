@@ -6,23 +6,28 @@ import os
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ....core.errors import HairError, cause_of
+from ....core.files import light_images
 from ...data.pictures import shader_sockets, unsaved_images
 from ...host import scene_time
 
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
+COARSE_SIZE = 256, 128  # of the first picture of views
 SAMPLES = 4  # per pixel
-SUN_SAMPLES = 16  # per pixel, if a Sky Texture shows the sun: its disk covers two pixels
+SUN_SAMPLES = 256  # per pixel around the sun of a Sky Texture, whose disk covers two pixels
+_AROUND_SUN = 3  # pixels
 
 # Values of the Light Path node for light that hair scatters.
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
 
 
-def render(path, name, frame, out):
+def render(path, name, frame, is_coarse, out):
     """Render a world of a .blend at a frame into an .exr. Raises `HairError`.
 
-    The picture is the radiance from all directions, in the projection of the Environment Texture node.
+    The picture is the radiance from all directions, in the projection of the Environment Texture node. is_coarse:
+    render a small picture, which is soon ready.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -35,13 +40,44 @@ def render(path, name, frame, out):
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
     replace_light_paths(scene.world.node_tree, set())
+    scene.world.cycles.sampling_method = "NONE"  # no map of bright directions, which takes most of the time
     add_camera(scene)
-    set_up(scene, SUN_SAMPLES if _has_sun(scene.world.node_tree) else SAMPLES)
+    sun = _size_of_sun(scene.world.node_tree)
+    # Few samples of large pixels would miss the sun.
+    set_up(scene, 1 if is_coarse else SAMPLES, COARSE_SIZE if is_coarse and sun is None else SIZE)
     scene_time.go_to_time(scene, frame)
     out = Path(out)
-    scene.render.filepath = str(out.with_suffix(".part.exr"))
+    part = out.with_suffix(".part.exr")
+    colors = picture(scene, part)
+    if sun is not None:
+        _render_sun(scene, colors, sun, part)
+    light_images.write_colors(part, colors)
+    os.replace(part, out)
+
+
+def picture(scene, path):
+    """Render (H, W, 3) float32, the lowest row first, through a file."""
+    scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
-    os.replace(scene.render.filepath, out)
+    return light_images.read_layers(path)[""]
+
+
+def _render_sun(scene, colors, sun, part):
+    """Render the pixels around the brightest pixel of a picture again, with many samples; sun: its diameter [rad]."""
+    height, width = colors.shape[:2]
+    row, column = np.unravel_index(colors.sum(axis=-1).argmax(), (height, width))
+    reach = math.ceil(0.5 * sun * height / math.pi) + _AROUND_SUN
+    latitude = math.pi * abs((row + 0.5) / height - 0.5) + reach * math.pi / height
+    across = min(math.ceil(reach / max(math.cos(latitude), 1e-3)), width)
+    rows = max(row - reach, 0), min(row + reach + 1, height)
+    columns = max(column - across, 0), min(column + across + 1, width)
+    scene.render.use_border = True
+    scene.render.use_crop_to_border = False
+    scene.render.border_min_x, scene.render.border_max_x = (edge / width for edge in columns)
+    scene.render.border_min_y, scene.render.border_max_y = (edge / height for edge in rows)
+    scene.cycles.samples = SUN_SAMPLES
+    around = np.s_[rows[0] : rows[1], columns[0] : columns[1]]
+    colors[around] = picture(scene, part)[around]
 
 
 def add_camera(scene):
@@ -54,13 +90,14 @@ def add_camera(scene):
     return scene.camera
 
 
-def _has_sun(tree):
-    """Return whether a Sky Texture shows the disk of its sun."""
+def _size_of_sun(tree):
+    """Return the largest diameter [rad] of the disks of suns that Sky Textures show; None without one."""
     skies = [one.node for one in shader_sockets.nodes_of(tree) if one.type == "TEX_SKY"]
-    return any(sky.sun_disc and sky.sky_type.endswith("SCATTERING") for sky in skies)
+    sizes = [sky.sun_size for sky in skies if sky.sun_disc and sky.sky_type.endswith("SCATTERING")]
+    return max(sizes, default=None)
 
 
-def set_up(scene, samples, size=SIZE):
+def set_up(scene, samples, size):
     """Set a scene's picture: linear EXR of all light, with `samples` and without filters."""
     cycles, render = scene.cycles, scene.render
     cycles.device, cycles.samples = "CPU", samples

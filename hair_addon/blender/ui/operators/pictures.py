@@ -8,6 +8,7 @@ from ....core.imaging.pixel_sampling import FRAME_FIELDS, MOST_DRAWN, PictureSet
 from ....core.long_work import Stage
 from ....core.shading.tables import lookup_tables
 from ... import io
+from ...data.pictures import picture_jobs
 from ...groom.selection import drawn_with, hair_of
 from ...host import paths
 from ...host.datablocks import Remembered
@@ -122,9 +123,26 @@ class VELLUS_OT_toggle_composite(HairOperator, bpy.types.Operator):
         (composite.turn_off if is_on else composite.turn_on)(context.scene)
 
 
+class VELLUS_OT_retry_baking(HairOperator, bpy.types.Operator):
+    """Let Cycles render and bake again what it could not for an error"""
+
+    bl_idname = "vellus.retry_baking"
+    bl_label = "Try Again"
+    bl_options = {"REGISTER"}  # no data changes
+
+    @classmethod
+    def applies(cls, _context):
+        cls.poll_message_set("There are no pictures that Cycles could not make.")
+        return picture_jobs.has_failed()
+
+    def change(self, _context):
+        picture_jobs.try_again()
+
+
 CLASSES = (
     VELLUS_OT_toggle_drawing,
     VELLUS_OT_bake_tables,
     VELLUS_OT_render_picture,
     VELLUS_OT_toggle_composite,
+    VELLUS_OT_retry_baking,
 )

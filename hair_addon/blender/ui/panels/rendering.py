@@ -5,14 +5,14 @@ import bpy
 from bl_ui import properties_view_layer
 
 from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
-from ...data.pictures import surface_bakes, unread_nodes, world_panoramas
+from ...data.pictures import unread_nodes
 from ...render import data_passes, mattes
 from ...render.frames.engine import NAME
 from ...render.viewport import live_light
 from ...settings.setting_properties import names_of
 from ...settings.translations import CONTEXT, interface_text
 from .. import setting_rows
-from .tab import split, write
+from .tab import split, write, write_missing_pictures
 
 
 class _OfEngine:
@@ -38,8 +38,7 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
         setting_rows.rows(self.layout, context.scene.vellus, RenderSettings, names)
         for sentence in map(interface_text, live_light.obstacles(context.scene)):
             write(self.layout, context, sentence, "INFO")
-        for sentence in (*world_panoramas.sentences(), *surface_bakes.sentences()):
-            write(self.layout, context, sentence, "INFO")
+        write_missing_pictures(self.layout, context)
         for sentence, values in unread_nodes.shown_sentences(context.scene):
             write(self.layout, context, interface_text(sentence, **values), "INFO")
 

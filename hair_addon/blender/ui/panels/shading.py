@@ -6,14 +6,13 @@ import bpy
 from ....core.shading import appearance
 from ....core.shading.appearance import Appearance
 from ....core.shading.presets import PRESETS
-from ...data.pictures import world_panoramas
 from ...groom.selection import active_of_kind, hair_of, object_of
 from ...groom.systems.diagnostics import modifier_notes
 from ...settings import saved_looks
 from .. import look_previews, picture_menus
 from ..setting_rows import others, row, rows
 from .preset_menu import PresetMenu
-from .tab import HairTab, split, write, write_status
+from .tab import HairTab, split, write, write_missing_pictures, write_status
 
 _COLORS = tuple(name for names in appearance.COLOR_FIELDS.values() for name in names)
 
@@ -59,8 +58,9 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         state = hair_of(context.object).vellus
         write_status(layout, context, state, "shading_status")
         row(layout, state, "is_drawn")
-        for note in (*modifier_notes(_hair_object(context)), *world_panoramas.sentences()):
+        for note in modifier_notes(_hair_object(context)):
             write(layout, context, note, "INFO")
+        write_missing_pictures(layout, context)
         for name in ("viewport_percentage", "is_reduced_in_viewport", "model"):
             row(layout, state, name)
         if state.model != "KAJIYA_KAY":

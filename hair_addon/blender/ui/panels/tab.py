@@ -3,6 +3,7 @@
 
 import textwrap
 
+from ...data.pictures import picture_jobs
 from ...host.notices import text_of
 from ...settings.translations import CONTEXT, interface_text, status_text
 from ..operators.systems import is_combing
@@ -48,6 +49,14 @@ def write_status(layout, context, state, name="status"):
     status = text_of(state, name)
     if status:
         write(layout, context, status_text(status), "ERROR")
+
+
+def write_missing_pictures(layout, context):
+    """Draw notes about worlds, lights and surfaces that Cycles is rendering or cannot render, and a button to retry."""
+    for sentence, is_error in picture_jobs.sentences():
+        write(layout, context, sentence, "ERROR" if is_error else "INFO")
+    if picture_jobs.has_failed():
+        layout.operator("vellus.retry_baking", icon="FILE_REFRESH")
 
 
 def write_stale(layout, context, state):

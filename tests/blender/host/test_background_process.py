@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One other process runs all jobs. It ends when it is idle, and with the process that started it."""
+
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from hair_addon.blender.host import background_process, cli_command
+from hair_addon.blender.io.pictures import background_jobs
+
+# Another process that ends or fails jobs as their values say.
+OTHER = """
+import json, os, sys
+from pathlib import Path
+for line in sys.stdin:
+    folder = Path(json.loads(line))
+    kind = json.loads((folder / "job.json").read_text())["kind"]
+    if kind == "lost":
+        sys.exit(0)
+    (folder / "begun").touch()
+    if kind == "crash":
+        os.abort()
+    (folder / "ended.txt").write_text("" if kind == "works" else kind)
+"""
+
+
+@pytest.fixture
+def job(tmp_path, monkeypatch):
+    """Return a function that starts a job of a kind."""
+    background_process.end()
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", OTHER])
+
+    def start(kind):
+        folder = tmp_path / f"{len(list(tmp_path.iterdir()))}"
+        folder.mkdir()
+        return background_process.Job(folder, {"kind": kind})
+
+    yield start
+    background_process.end()
+
+
+def test_jobs_have_one_process(job):
+    """Jobs run in turn in one process. A job whose process ends before it begins has another process."""
+    works, refused = job("works"), job("too bright")
+    assert works._process is refused._process
+    for one, complaint in ((works, ""), (refused, "too bright")):
+        one.wait(20.0)
+        assert one.complaint() == complaint
+    crash, queued = job("crash"), job("works")
+    crash.wait(20.0)
+    queued.wait(20.0)
+    assert "ended with status" in crash.complaint() and queued.complaint() == ""
+    lost = job("lost")
+    lost.wait(20.0)
+    assert lost.is_ended() and lost.complaint()
+
+
+def test_a_job_is_given_up_after_its_time(job, monkeypatch):
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    late = job("works")
+    late.wait(0.01)
+    assert "seconds" in late.complaint()
+    assert not late._process.is_running
+
+
+def test_an_idle_process_ends(monkeypatch):
+    """Without jobs the process returns from its work; at the end of its input it exits at once."""
+    exited = threading.Event()
+    monkeypatch.setattr(os, "_exit", lambda _status: exited.set())
+    monkeypatch.setattr(background_process, "IDLE", 0.01)
+    read, write = os.pipe()
+    background_jobs.serve(read)
+    assert not exited.is_set()
+    os.close(write)
+    assert exited.wait(20.0)
+    os.close(read)
+
+
+def test_a_job_that_was_dropped_is_left_out(tmp_path):
+    background_jobs._run(tmp_path / "gone")
+
+
+@pytest.mark.farm
+def test_the_process_ends_with_its_parent(tmp_path):
+    """When the parent is killed, the other process ends and leaves no folder behind."""
+    folder = tmp_path / "job"
+    folder.mkdir()
+    told = tmp_path / "told"
+    values = {"kind": "world", "sources": [["missing.blend", "World"]], "frame": 1.0, "is_coarse": True}
+    code = f"""
+        import time
+        from pathlib import Path
+        from hair_addon.blender.host import background_process
+        job = background_process.Job(Path({str(folder)!r}), {values!r})
+        Path({str(told)!r}).write_text(str(job._process._process.pid))
+        time.sleep(60.0)
+    """
+    parent = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.DEVNULL)
+    end = time.monotonic() + 60.0
+    while not (told.is_file() and told.read_text()) and time.monotonic() < end:
+        time.sleep(0.05)
+    other = int(told.read_text())
+    assert _runs(other)
+    parent.kill()
+    parent.wait()
+    while _runs(other) and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not _runs(other) and not folder.exists()
+
+
+def _runs(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
