@@ -4,6 +4,7 @@
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -12,7 +13,6 @@ from ..geometry.mesh import SurfacePoints, TriMesh
 from ..kernels import parallel
 from ..kernels.checks import require_indices
 from . import uv_islands
-from .pixels import changed_box
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -31,6 +31,11 @@ class _Taps:
     texels: np.ndarray
     weights: np.ndarray
     size: tuple[int, int]  # (width, height)
+
+    @cached_property
+    def limits(self) -> np.ndarray:
+        """The least and the greatest index of texels."""
+        return np.array([self.texels.min(initial=0), self.texels.max(initial=0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +74,8 @@ class Levels:
         self.texels = np.concatenate([level.reshape(-1, pixels.shape[2]) for level in levels])
         self._shapes = [level.shape for level in levels]
 
-    def follow(self, pixels: np.ndarray) -> None:
-        """Show other pixels of the same shape: only rows that differ are halved again."""
-        changed = None if pixels is self.pixels else changed_box(self.pixels, pixels)
+    def follow(self, pixels: np.ndarray, changed: tuple[slice, slice] | None) -> None:
+        """Show other pixels of the same shape: only changed rows are halved again; changed: as of `changed_box`."""
         self.pixels = pixels
         if changed is None:
             return
@@ -96,7 +100,7 @@ def halved(pixels: np.ndarray) -> np.ndarray:
 
 
 def _means(taps, texels):
-    require_indices("texels", taps.texels, len(texels))
+    require_indices("texels", taps.limits, len(texels))
     sources, cells, weights, found = (
         wp.array(values, dtype=kind, ndim=2, device="cpu", copy=False)
         for values, kind in (

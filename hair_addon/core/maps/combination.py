@@ -54,7 +54,7 @@ def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combi
         colors = 1.0 - colors
     share = (how.amount * np.asarray(alpha, float))[:, None]
     mixed = np.where(share == 1.0, colors, (1.0 - share) * np.asarray(value, float) + share * colors)
-    is_known = np.isfinite(colors).all(axis=1, keepdims=True) & np.isfinite(share)
+    is_known = np.isfinite(colors[:, :1] + colors[:, 1:2] + colors[:, 2:]) & np.isfinite(share)
     return np.clip(np.where(is_known, mixed, np.asarray(value, float)), details.low, details.high)
 
 

@@ -3,7 +3,7 @@
 
 import hashlib
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -20,11 +20,18 @@ pixel_cache = Cache(capacity=16)
 
 @dataclass(frozen=True, eq=False)
 class _Converted:
-    """Pixels of an image (H, W, C) in Blender, and the converted pixels; way: arguments of the conversion."""
+    """Pixels of an image (H, W, C) in Blender, and the converted pixels; way: arguments of the conversion.
+
+    spare: an array of the same size to read the image into; before, changed: the pixels that a change replaced, and the
+    box in which they differ.
+    """
 
     raw: np.ndarray
     way: dict
     pixels: np.ndarray
+    spare: np.ndarray | None = None
+    before: np.ndarray | None = None
+    changed: tuple[slice, slice] | None = None
 
 
 # (session_uid of an image, whether as colors) → `_Converted`, which is compared with the present pixels.
@@ -62,9 +69,19 @@ def _may_be_painted(image):
     return (image.is_dirty or image.source == "GENERATED") and all(image.size)
 
 
-def _raw(image):
+def changed_since(before, now):
+    """Return the box in which converted pixels of a painted image differ from those before; None if they are equal."""
+    if before is now:
+        return None
+    known = (each for each in converted_cache.values() if each.before is before and each.pixels is now)
+    return next((each.changed for each in known), None) or pixels.changed_box(before, now)
+
+
+def _raw(image, into=None):
+    """Return the pixels (H, W, C) in Blender; into: an array to fill, if it has their shape."""
     width, height = image.size
-    values = np.empty((height, width, image.channels), np.float32)
+    shape = height, width, image.channels
+    values = into if into is not None and into.shape == shape else np.empty(shape, np.float32)
     image.pixels.foreach_get(values.ravel())
     return values
 
@@ -112,19 +129,20 @@ def _pixels_of(image, named, is_color, is_painted=False):
     if not (width and height and image.channels):
         raise _without_pixels(named)
     convert = pixels.colors if is_color else pixels.masks
-    raw, way = _raw(image), conversion_of(image)
-    if not is_painted or max(raw.shape[:2]) > pixels.MOST_SIDE:
-        return convert(raw, **way)
+    way = conversion_of(image)
+    if not is_painted or max(width, height) > pixels.MOST_SIDE:
+        return convert(_raw(image), **way)
     key = image.session_uid, is_color
     known = converted_cache.get(key)
+    raw = _raw(image, None if known is None else known.spare)
     if known is None or known.way != way or known.raw.shape != raw.shape:
         return converted_cache.keep(key, _Converted(raw, way, convert(raw, **way))).pixels
     changed = pixels.changed_box(known.raw, raw)
     if changed is None:
-        return known.pixels
+        return converted_cache.keep(key, replace(known, raw=raw, spare=known.raw)).pixels
     found = known.pixels.copy()  # other users of the image compare their pixels with it
     found[changed] = convert(raw[changed], **way)
-    return converted_cache.keep(key, _Converted(raw, way, found)).pixels
+    return converted_cache.keep(key, _Converted(raw, way, found, known.raw, known.pixels, changed)).pixels
 
 
 def conversion_of(image):

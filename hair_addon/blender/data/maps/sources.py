@@ -145,7 +145,7 @@ class Source:
         levels = level_cache.get(key)
         if levels is None or levels.pixels.shape != values.shape:
             return level_cache.keep(key, maps.box_filter.Levels(values))
-        levels.follow(values)
+        levels.follow(values, image_pixels.changed_since(levels.pixels, values))
         return levels
 
 
