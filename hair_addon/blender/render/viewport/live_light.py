@@ -38,6 +38,8 @@ _MOST_ASKED = 20  # requested redraws after which a region that was not drawn co
 _SHARES = 16  # number of shares of a picture's paths, each followed between two redraws
 _RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
 _LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
+# After a picture's paths, shares grow, so that the picture starts again less often: part of the paths so far, maximum.
+_GROWTH, _MOST_GROWN = 0.25, 131_072
 _HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
 _NICE = 10  # priority of the thread, if the system has priorities of threads
 _STILL = 0.01  # fraction of the hair's radius by which strands may move and still count as still
@@ -392,13 +394,17 @@ class LiveLight:
             if before is not None:
                 request["weight"] = content.part_since(before[0]) * _view_weight(camera, before[1], content.centre)
                 request["shift"] = content.centre - before[0].centre
-        share = min(max((self._goal or count) // _SHARES, _LEAST_SHARE), _MOST_SHARE)
-        work = _Request(count=share, **request)
+        work = _Request(count=self._share_of(self._goal or count), **request)
         if work.shown is not None:
             self._faded = 1.0 - work.weight
         self._seed += 1
         self._job = Job(lambda progress: self._follow(work, progress))
         _jobs[:] = [self._job]
+
+    def _share_of(self, goal):
+        """Return the number of paths of the next share; goal: paths of the picture."""
+        share = min(max(goal // _SHARES, _LEAST_SHARE), _MOST_SHARE)
+        return share if self._tried < goal else min(max(share, int(_GROWTH * self._tried)), _MOST_GROWN)
 
     def _follow(self, work, progress):
         """In the thread: (paths of the share, shares by voxel); None if no strand is in sight."""
@@ -460,8 +466,8 @@ class LiveLight:
         self._tried += taken
         if self._paths.taken >= self._goal:
             self._former = None
-        is_known = self._paths.taken >= self._goal and self._paths.wanted < 1.0
-        is_spent = self._tried >= light_paths.MOST_TIMES * self._goal
+        is_known = self._paths.taken >= self._goal and self._paths.wanted_for(light_paths.NOISE) < 1.0
+        is_spent = self._tried >= self._most
         new_part = 1.0 if is_spent or self._turned is None else self._new_part()
         self._is_done = part == 1.0 and (is_spent or (is_known and new_part == 1.0))
         if new_part < 1.0:
@@ -479,7 +485,12 @@ class LiveLight:
         removed from former paths.
         """
         known = max(self._goal, self._paths.taken * self._paths.wanted)
-        return min(self._tried / max(self._faded * min(known, light_paths.MOST_TIMES * self._goal), 1.0), 1.0)
+        return min(self._tried / max(self._faded * min(known, self._most), 1.0), 1.0)
+
+    @property
+    def _most(self):
+        """The maximum number of paths of the picture."""
+        return light_paths.most_paths(self._paths.grid.device, self._goal)
 
     def _part(self):
         """Return the part of the picture's light that is measured light, from 0 to 1."""

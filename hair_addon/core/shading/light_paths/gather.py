@@ -7,6 +7,7 @@ scattering, with sharp shadows. From these three sums `voxel_means` computes how
 that the mean light of the voxel is that of the paths.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -125,14 +126,15 @@ def gather(
     seed: int = 0,
     most_paths: int = 0,
     progress: Progress = no_progress,
+    noise: float = math.inf,
 ) -> tuple[list[wp.array4d[wp.float64]], int, float]:
     """Return ((Z, Y, X, 12) sums for each hair system on the device of the grid, number of paths, weight of larger
     voxels for `voxel_means.shares`). The sums of a voxel are RGB: over paths, their light and the light in uniform
     light; over the picture's samples, the light drawn without paths and the light in uniform light.
 
     About `path_count` paths start on visible hair. Further passes add the number of paths that reduces the relative
-    standard error of the mean light to 1.5 % by estimate, at most as many as before, up to `most_paths` in total: in
-    dark hair few paths reach a lamp.
+    standard error of the mean light to 1.5 %, and that of visible voxels to `noise`, by estimate, at most as many as
+    before, up to `most_paths` in total: in dark hair few paths reach a lamp.
     """
     light = PathSums(grid, surroundings)
     light.see(seen)
@@ -142,7 +144,7 @@ def gather(
     while True:
         light.follow(more, seed * _MOST_TURNS + turn, part_of(progress, tried / (tried + more), 1.0))
         tried, turn = tried + more, turn + 1
-        wanted = light.wanted  # factor of the number of paths
+        wanted = light.wanted_for(noise)  # factor of the number of paths
         more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
         if wanted < 1.0 or tried + more > most_paths:
             return light.of_systems(), int(light.taken), light.prior
@@ -159,6 +161,7 @@ class PathSums:
         self._sums = voxel_sums.VoxelSums(grid)
         self._total = self._squares = 0.0
         self._seen: Seen | None = None
+        self._voxel_count = 0  # with visible hair
         self._surroundings = surroundings
         with wp.ScopedDevice(grid.device):
             self._mesh = mesh_of(surroundings.corners)
@@ -188,7 +191,7 @@ class PathSums:
         even = _even_there(self._medium, seen.view, seen.segments, seen.places)
         faint = _FAINT * voxel_sums.brightness(seen.drawn)[0] / len(seen.segments)
         self._sources = sources_of(self._surroundings, faint)
-        self._voxels = start_places.voxels_of(self._medium, seen.places)
+        self._voxels, self._voxel_count = start_places.voxels_of(self._medium, seen.places)
         return even
 
     def follow(self, count: int, seed: int, progress: Progress = no_progress) -> None:
@@ -211,12 +214,24 @@ class PathSums:
         """The factor of paths that, by estimate, reduces the relative standard error of the mean light to 1.5 %."""
         return (_standard_error(self._total, self._squares, self.taken) / _KNOWN) ** 2
 
+    def wanted_for(self, noise: float) -> float:
+        """Return the greater of `wanted` and the factor of paths that, by estimate, reduces the relative standard error
+        of the light of visible voxels to `noise`, with the weight of larger voxels.
+        """
+        if self._total <= 0.0:
+            return math.inf
+        paths = (self._variance / noise**2 - self.prior) * self._voxel_count
+        return max(self.wanted, paths / self.taken)
+
     @property
     def prior(self) -> float:
         """The weight of larger voxels, in paths, for `voxel_means.shares`."""
-        if self._total <= 0.0:
-            return voxel_means.MOST_PRIOR
-        return voxel_means.prior_of(_standard_error(self._total, self._squares, self.taken) ** 2 * self.taken)
+        return voxel_means.prior_of(self.taken / max(self._voxel_count, 1))
+
+    @property
+    def _variance(self):
+        """Variance of a path's light, relative to the square of its mean."""
+        return _standard_error(self._total, self._squares, self.taken) ** 2 * self.taken
 
     def _fade(self, weight):
         self._sums.scale(weight)
@@ -239,7 +254,8 @@ class PathSums:
             sums, taken = voxel_sums.VoxelSums(self.grid), taken + weight * former.taken
             sums.carry(self._sums, 1.0, 0.0)
             sums.carry(former._sums, weight, shift)
-        count, origin, prior = max(int(taken), 1), self.grid.origin, self.prior
+        count, origin = max(int(taken), 1), self.grid.origin
+        prior = voxel_means.prior_of(taken / max(self._voxel_count, 1))
         return of_each(lambda of_hair: voxel_means.shares(of_hair, count, origin, prior), sums.of_systems())
 
 

@@ -9,6 +9,7 @@ paths therefore begin at the same places, and their light changes little.
 
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from ...kernels import kernel_cache, running_sums
@@ -144,8 +145,8 @@ def _spread(holds: wp.array3d[wp.uint8], out_touches: wp.array3d[wp.uint8]):
                     out_touches[layer, row, column] = wp.uint8(1)
 
 
-def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> wp.array3d[wp.uint8]:
-    """Return (Z, Y, X): one in voxels that contain places (N,), and in their neighbors.
+def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> tuple[wp.array3d[wp.uint8], int]:
+    """Return ((Z, Y, X): one in voxels that contain places (N,), and in their neighbors; number without neighbors).
 
     Samples miss thin hair, which may be visible beside them.
     """
@@ -153,7 +154,7 @@ def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> wp.array3d[wp.uint8]
     holds, touches = (wp.zeros((z, y, x), dtype=wp.uint8, device=places.device) for _ in range(2))
     kernel_cache.launch(_mark, len(places), [places, medium.corner, medium.voxel], [holds], places.device)
     kernel_cache.launch(_spread, (z, y, x), [holds], [touches], places.device)
-    return touches
+    return touches, int(np.count_nonzero(holds.numpy()))
 
 
 @wp.kernel

@@ -14,8 +14,8 @@ wp.set_module_options({"enable_backward": False})
 
 # RGB of four sums: light of paths, and the same in uniform light; drawn light, and the same in uniform light.
 CHANNELS = 12
-_CHANGE = 0.25  # assumed variance of the ratio between a voxel and larger ones, relative to its square
-_LEAST_PRIOR, MOST_PRIOR = 8.0, 128.0  # weight of the ratio of larger voxels, in paths
+MOST_PRIOR, _LEAST_PRIOR = 128.0, 8.0  # weight of the ratio of larger voxels, in paths
+_FALL = 2000.0  # product of that weight and the paths of a voxel between these limits
 _LEAST_VOXELS = 4096  # fewer are not worth a thread
 _MOST_PARTS = 512  # maximum number of parts of a sum
 
@@ -231,11 +231,11 @@ def _keep(
     out_shares[layer, row, column] = wp.vec4(float(light[0]), float(light[1]), float(light[2]), float(kept))
 
 
-def prior_of(variance: float) -> float:
-    """Return the weight of larger voxels, in paths, for light of paths with this variance relative to the square of its
-    mean: the weights of least error are inverse to the variances of a path and of the light between voxels.
+def prior_of(path_count: float) -> float:
+    """Return the weight of larger voxels, in paths, for voxels with a number of paths on average: it falls as paths are
+    added, because light leaks past edges by its weight.
     """
-    return min(max(variance / _CHANGE, _LEAST_PRIOR), MOST_PRIOR)
+    return min(max(_FALL / max(path_count, 1.0), _LEAST_PRIOR), MOST_PRIOR)
 
 
 def shares(

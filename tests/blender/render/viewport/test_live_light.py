@@ -25,8 +25,12 @@ TIMES = itertools.count(0.0, 10.0)  # [s] of redraws, each long after the last
 
 
 @pytest.fixture
-def view(scene, rng):
-    """Return (camera, function that reads the scene as a viewport does) of blond hair in a lamp and a world."""
+def view(scene, rng, monkeypatch):
+    """Return (camera, function that reads the scene as a viewport does) of blond hair in a lamp and a world.
+
+    Voxels may stay noisy, so that few paths suffice.
+    """
+    monkeypatch.setattr(light_paths, "NOISE", np.inf)
     hair_of(scene, rng.uniform(-0.3, 0.3, (600, 3)), BLOND, radius=0.006)
     light(scene, world=0.1, sun=4.0)
 
@@ -92,6 +96,18 @@ def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
     scale = render.mean()
     assert np.abs(live - render).mean() < 0.03 * scale
     assert np.abs(dual - render).mean() > 0.06 * scale
+
+
+def test_paths_are_added_at_rest_while_voxels_are_noisy(view, monkeypatch):
+    """At rest, noisy voxels get more paths than a picture has, up to a maximum."""
+    monkeypatch.setattr(gather, "_KNOWN", 1.0)
+    monkeypatch.setattr(light_paths, "NOISE", 1e-3)
+    monkeypatch.setattr(light_paths, "_MOST_TIMES", 3)
+    camera, read = view
+    live = live_light.LiveLight()
+    at_rest(live, read(), camera)
+    most = light_paths.most_paths(live._paths.grid.device, live._goal)
+    assert most > 2 * live._goal and most <= live._paths.taken < 1.5 * most
 
 
 def test_the_picture_goes_over_to_paths_in_steps(view):

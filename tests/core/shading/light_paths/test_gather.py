@@ -390,6 +390,21 @@ def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
     assert errors[-1] < errors[0] / 1.1
 
 
+def test_paths_are_added_until_each_voxel_is_known(rng):
+    """The light of visible voxels differs from that of other paths by about the asked noise of both."""
+    grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=300)
+    light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
+    seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 1000)
+    count, noise, ratios = len(seen.segments) // 4, 0.15, []
+    for seed in range(2):
+        sums, taken = gathered(grid, light, seen, count, seed, most_paths=512 * count, noise=noise)
+        assert 2 * count < taken < 500 * count
+        ratios.append(sums[..., :3].sum(axis=-1) / np.maximum(sums[..., 3:6].sum(axis=-1), 1e-12))
+    weights = sums[..., 3:6].sum(axis=-1)
+    difference = np.sqrt(0.5 * np.average(np.square(ratios[0] - ratios[1]), weights=weights))
+    assert difference < 1.3 * noise * np.average(ratios[0], weights=weights)
+
+
 def lit_from_below(grid, light, path_count):
     """Return the `ratio` of light that does not come straight from a lamp."""
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, path_count)
@@ -494,20 +509,21 @@ def test_light_does_not_leak_past_the_edge_of_a_shadow(rng):
     assert np.square(found - is_lit).mean() < np.square(light - is_lit).mean() / 9.0
 
 
-@pytest.mark.parametrize(("relative_variance", "other"), [(1.0, 128.0), (25.0, 8.0)], ids=["calm", "noisy"])
-def test_the_noise_of_paths_decides_how_much_voxels_are_smoothed(rng, relative_variance, other):
-    """Calm light is smoothed less and noisy light more, so that each differs less from the light of endless paths than
-    with the smoothing of the other.
+def test_light_of_more_paths_is_smoothed_less(rng):
+    """Sharp light is known within 3 % if voxels have many paths, and has a third of the noise of the paths if they have
+    few.
     """
-    side, paths = 16, 32
+    side, variance = 16, 6.0
     expected = 1.0 + 0.7 * np.sin(np.arange(side))[:, None] * np.ones((side, side, side, 3))
-    noise = rng.gamma(paths / relative_variance, relative_variance / paths, (side, side, side, 1))
-    sums = by_voxel(np.concatenate([expected * noise, np.ones_like(expected)], axis=-1))
-    priors = voxel_means.prior_of(relative_variance), other
-    errors = [
-        np.square(voxel_means.smooth_ratios(sums, paths * side**3, prior=prior) - expected).mean() for prior in priors
-    ]
-    assert errors[0] < 0.8 * errors[1]
+
+    def error(paths):
+        noise = rng.gamma(paths / variance, variance / paths, (side, side, side, 1))
+        sums = by_voxel(np.concatenate([expected * noise, np.ones_like(expected)], axis=-1))
+        found = voxel_means.smooth_ratios(sums, paths * side**3, prior=voxel_means.prior_of(paths))
+        return float(np.sqrt(np.square(found - expected).mean()))
+
+    assert error(10_000) < 0.03 and error(1_000) < 0.1
+    assert error(2) < np.sqrt(variance / 2) / 3.0
 
 
 def test_hair_has_the_same_light_in_a_grid_of_more_hair(rng):

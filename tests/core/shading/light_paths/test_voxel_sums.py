@@ -100,7 +100,7 @@ def test_voxels_in_sight_are_those_of_places_and_what_touches_them(rng):
     at = np.clip(np.floor((places - grid.corner) / grid.voxel), 0, np.array(grid.shape) - 1)
     every = np.stack(np.meshgrid(*(np.arange(side) for side in grid.shape), indexing="ij"), axis=-1)
     expected = (np.abs(every[..., None, :] - at).max(axis=-1) <= 1).any(axis=-1)
-    found = start_places.voxels_of(medium, media.vectors(places)).numpy()
+    found = start_places.voxels_of(medium, media.vectors(places))[0].numpy()
     np.testing.assert_array_equal(found.astype(bool), expected.transpose(2, 1, 0))
 
 
