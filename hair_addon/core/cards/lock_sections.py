@@ -20,13 +20,17 @@ _SLENDER = 1.5  # least length of hair relative to its diameter
 
 @dataclass(frozen=True)
 class Sections:
-    """K sections: centers, normals and binormals (K, 3); radii (K, n) in n directions around; vertices (K, n) there."""
+    """K sections: centers, normals and binormals (K, 3); radii (K, n) in n directions around; vertices (K, n) there.
+
+    sizes: (K,) mean radius of the corners, which is the radius of a round strand that a tube was made of.
+    """
 
     centers: np.ndarray
     normals: np.ndarray
     binormals: np.ndarray
     radii: np.ndarray
     vertices: np.ndarray
+    sizes: np.ndarray
 
     def places(self, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (positions (S, K, 3), vertices (S, K)) of lines along the sections.
@@ -64,7 +68,7 @@ def _slender(found, root_first):
     if is_first is None:  # the thicker end
         is_first = _size(found[0][0]) >= _size(found[-1][0])
     sections = _measured(found if is_first else found[::-1])
-    return None if length < _SLENDER * 2.0 * sections.radii.mean(axis=1).max() else sections
+    return None if length < _SLENDER * 2.0 * sections.sizes.max() else sections
 
 
 def _size(ring):
@@ -77,17 +81,33 @@ def _measured(found):
     normals = curve_frames.steady_normals(centers[None])[0]
     binormals = np.cross(curve_frames.tangents(centers[None])[0], normals)
     radii, vertices = np.zeros((len(found), _SIDES)), np.zeros((len(found), _SIDES), int)
+    sizes = np.zeros((len(found), 1))
     angles = np.arange(_SIDES) * (2.0 * np.pi / _SIDES)
     for row, (points, those) in enumerate(found):
         offsets = points - centers[row]
         x, y = offsets @ normals[row], offsets @ binormals[row]
         at = np.arctan2(y, x)
-        radii[row] = np.interp(angles, at, np.hypot(x, y), period=2.0 * np.pi)
+        sizes[row] = np.interp(angles, at, np.hypot(x, y), period=2.0 * np.pi).mean()
+        radii[row] = _outline(angles, at % (2.0 * np.pi), np.hypot(x, y))
         apart = np.abs((at - angles[:, None] + np.pi) % (2.0 * np.pi) - np.pi)
         vertices[row] = those[apart.argmin(axis=1)]
-    parts = divided(np.concatenate([centers, normals, binormals, radii], axis=1))
+    parts = divided(np.concatenate([centers, normals, binormals, sizes, radii], axis=1))
     nearest = np.round(np.linspace(0, len(found) - 1, len(parts))).astype(int)
-    return Sections(parts[:, :3], parts[:, 3:6], parts[:, 6:9], parts[:, 9:], vertices[nearest])
+    return Sections(parts[:, :3], parts[:, 3:6], parts[:, 6:9], parts[:, 10:], vertices[nearest], parts[:, 9])
+
+
+def _outline(angles, at, radii):
+    """Return the radii (n,) in directions [rad] of a polygon with corners at angles (m,) in [0, 2π) and radii (m,)."""
+    order = np.argsort(at, kind="stable")
+    at, radii = at[order], radii[order]
+    after = np.searchsorted(at, angles) % len(at)
+    before = after - 1
+    gap, into = (at[after] - at[before]) % (2.0 * np.pi), (angles - at[before]) % (2.0 * np.pi)
+    first, second = radii[before], radii[after]
+    linear = first + (second - first) * into / np.where(gap > 0.0, gap, 1.0)
+    across = first * np.sin(into) + second * np.sin(gap - into)
+    is_side = (gap > 0.0) & (gap < np.pi) & (into <= gap) & (across > 0.0)
+    return np.where(is_side, first * second * np.sin(gap) / np.where(is_side, across, 1.0), linear)
 
 
 def _rings(topology, points):

@@ -187,7 +187,7 @@ class _Maker:
         corners = np.empty(len(piece.vertices), np.int64)
         triangle, corner = np.nonzero(piece.first_corners)
         corners[piece.topology.triangles[triangle, corner]] = 3 * piece.faces[triangle] + corner
-        radii = sections.radii.mean(axis=1) / np.sqrt(count)
+        radii = sections.sizes / np.sqrt(count)
         stations = found.shape[1]
         self._parts.append((False, count, stations, radii, found.reshape(-1, 3), corners[vertices].ravel()))
 

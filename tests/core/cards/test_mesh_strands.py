@@ -129,6 +129,20 @@ def test_tubes_of_strands_become_the_strands(sides):
     assert (apart <= 1.001 * rings[:, None]).all() and apart.max() > 0.6 * rings.max()
 
 
+@pytest.mark.parametrize("sides", [3, 6])
+def test_strands_of_a_tube_stay_between_its_flat_sides(sides):
+    """Sections are polygons with the sides of the tube: strands fill them, and none is outside."""
+    straight = np.stack([np.zeros(9), np.zeros(9), np.linspace(0.0, 0.3, 9)], axis=1)[None].astype(np.float32)
+    settings = TubeSettings(tube_count=0, side_count=sides, point_count=9)
+    mesh = tubes.tubes(straight, np.full((1, 9), 0.01), settings)
+    ring = mesh.vertices.reshape(9, sides, 3)[4, :, :2].astype(np.float64)
+    found = made(triangulated(mesh), strand_count=60)
+    middle = 0.5 * (ring + np.roll(ring, -1, axis=0))
+    heights = np.linalg.norm(middle, axis=1)
+    reach = found.points[:, :2] @ (middle / heights[:, None]).T / heights
+    assert (reach.max(axis=0) > 0.75).all() and reach.max() < 1.02
+
+
 def test_the_axis_of_a_solid_lock_runs_from_the_surface_to_its_tip():
     """A long ellipsoid without rings gives strands inside of it, from its end at the surface to its other end."""
     ball = sphere(1.0)
