@@ -63,11 +63,17 @@ def test_a_groom_is_made_told_of_and_drawn(vellus):
     camera.location = (0.0, 0.0, 3.0)
     bpy.context.scene.collection.objects.link(camera)
     bpy.context.scene.camera = camera
+    # The process of the command starts another, which renders a panorama for each frame.
+    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    noise = world.node_tree.nodes.new("ShaderNodeTexNoise")
+    world.node_tree.links.new(noise.outputs["Color"], world.node_tree.nodes["Background"].inputs["Color"])
+    noise.inputs["Scale"].driver_add("default_value").driver.expression = "frame"
     bpy.ops.wm.save_as_mainfile(filepath=str(vellus.folder / "shot.blend"))
     render = ("render", vellus.folder / "shot.blend", "--frames", "1-2", "--width", 64, "--height", 48)
     drawn = vellus(*render, "--out", vellus.folder / "f_#.png", "--json")
     assert [result["frame"] for result in results(drawn)] == [1, 2], drawn.stderr
     assert (vellus.folder / "f_1.png").exists() and (vellus.folder / "f_2.png").exists()
+    assert len(list(vellus.folder.rglob("worlds/*.exr"))) == 2
 
 
 def test_it_ends_as_it_should(vellus):
