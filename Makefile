@@ -13,6 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 python = .venv/bin/python
 installed = .venv/installed
 peers = .venv/peers
+actionlint = github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
@@ -57,11 +58,13 @@ pictures: $(installed) ## the pictures of README and manual, in docs; ARGS="styl
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)
 
-lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor: workflows
+lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor and, with Go, actionlint: workflows
 	$(python) -m ruff check
 	$(python) -m ruff format --check
 	$(python) -m pyrefly check
 	.venv/bin/zizmor --offline --no-progress --quiet .github/workflows
+	if command -v go >/dev/null; then go run $(actionlint) -shellcheck= -pyflakes= .github/workflows/*.yml; \
+	  else echo "actionlint is left out: there is no Go"; fi
 
 samples: $(installed) ## the .blend files of blend_samples
 	$(python) blend_samples/build_samples.py $(ARGS)
