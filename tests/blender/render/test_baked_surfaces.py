@@ -9,7 +9,14 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import drawn_meshes, kept_files, picture_jobs, surface_bakes, unread_nodes
+from hair_addon.blender.data.pictures import (
+    drawn_meshes,
+    kept_files,
+    picture_jobs,
+    surface_bakes,
+    surface_materials,
+    unread_nodes,
+)
 from hair_addon.blender.host import background_process, cli_command
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
@@ -255,6 +262,39 @@ def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
     assert not picture_jobs.running() and len(picture_jobs.sentences()) == 2
     mesh = next(one for one in drawn_meshes.read_drawn_meshes(depsgraph) if one.owner[0] == placed.session_uid)
     np.testing.assert_allclose(mesh.colors[0][1], (0.2, 0.3, 0.4), rtol=1e-6)
+
+
+def test_meshes_in_edit_mode_keep_their_last_pictures(stage, tmp_path, capsys):
+    """In Edit Mode a mesh has its last pictures while they fit, without bakes and messages."""
+    placed = wall(bricks())
+    corners = len(placed.data.loops)
+    made = {name: np.zeros((4, 4), np.float16) for name in ("roughness", "metallic", "weight")}
+    uvs, color = np.zeros((corners, 2), np.float32), np.zeros((4, 4, 3), np.float16)
+    path = tmp_path / "bake.npz"
+    np.savez(path, uvs=uvs, color=color, normal=color[:0], **{**made, "weight": made["weight"] + 1})
+    picture_jobs.last_cache.keep(placed.session_uid, path)
+
+    view = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+
+    def is_baked():
+        bpy.context.view_layer.update()
+        meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get(), view)
+        return [material.is_baked for mesh in meshes for _count, material in mesh.materials]
+
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert is_baked() == [True] and not picture_jobs.running()
+    bpy.ops.mesh.extrude_region_move(TRANSFORM_OT_translate={"value": (0.0, 0.0, 1.0)})
+    assert is_baked() == [False] and not picture_jobs.running()
+    assert "Vellus" not in capsys.readouterr().err
+
+
+def test_tiles_of_udim_are_baked_without_a_message(scene, capsys):
+    material, tree, shader = new_tree("Skin")
+    image = node(tree, "ShaderNodeTexImage", shader.inputs["Base Color"], coordinates=False)
+    image.image = bpy.data.images.new("Skin", 4, 4, tiled=True)
+    assert unread_nodes.baked_labels(material) == ["Image Texture"]
+    surface_materials.read_material(material)
+    assert "Vellus" not in capsys.readouterr().err
 
 
 def test_instances_of_geometry_nodes_are_read_in_turn(stage, monkeypatch):

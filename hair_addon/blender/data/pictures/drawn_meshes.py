@@ -239,7 +239,8 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, 
         layout = _layout(mesh_object, mesh, is_moving)
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
-        if bake is not None and not bake.fits(len(mesh.loops), name_of(mesh_object)):
+        name = "" if mesh_object.original.data.is_editmode else name_of(mesh_object)
+        if bake is not None and not bake.fits(len(mesh.loops), name):
             bake = None
         parts = _parts(mesh_object, layout, override, bake)
         uvs = _read_uvs(mesh, layout.loops, parts, has_uvs, bake)

@@ -41,8 +41,8 @@ class Bake:
     weight: np.ndarray
 
     def fits(self, corner_count, name):
-        """Whether a mesh has the corners of the pictures; prints a message if not."""
-        if len(self.uvs) != corner_count:
+        """Whether a mesh has the corners of the pictures; prints a message with a name if not."""
+        if len(self.uvs) != corner_count and name:
             say(
                 f'The baked materials of "{name}" do not fit its mesh: apply modifiers that change its faces over time.'
             )
@@ -85,21 +85,23 @@ def find(objects, override, frame, for_render, waits):
 
     override: the view layer's material; frame: the time of drivers of nodes; waits: return only when all are baked.
     Without `waits`, the most recent pictures of an object, if there are any, are used until new coarse pictures are
-    baked, and the coarse ones until the fine pictures are.
+    baked, and the coarse ones until the fine pictures are. They are used in Edit Mode too, without bakes.
     """
-    paths, originals = {}, {}
+    paths, originals, edited = {}, {}, set()
     for one in objects:
         uid = one.original.session_uid
-        if uid not in paths and _needs_bake(one, override):
+        if one.original.data.is_editmode and not waits:
+            edited.add(uid)
+        elif uid not in paths and _needs_bake(one, override):
             paths[uid] = _path_of(one)
             originals[paths[uid]] = one.original  # linked objects have common pictures
     files, errors = picture_jobs.files_of("surfaces", originals, waits, frame=float(frame), for_render=for_render)
     for error in errors:
         say(str(error))
     bake_cache.make_room(len(paths))
-    found = {}
-    for uid, path in paths.items():
-        made, last = files.get(path), picture_jobs.last_cache
+    found, last = {}, picture_jobs.last_cache
+    for uid, path in (*paths.items(), *((uid, None) for uid in edited)):
+        made = files.get(path)
         path = last.get(uid) if made is None else last.keep(uid, made)
         if path is not None and path.is_file():
             found[uid] = bake_cache.get(path, lambda path=path: _read(path))

@@ -202,7 +202,9 @@ def reads_image(shader_input):
 
 
 def _is_readable(image, material):
-    """Whether an image has pixels of a single picture; if not, print a message."""
+    """Whether an image has pixels of a single picture; if not, print a message. Images of UDIM tiles are baked."""
+    if image.source == "TILED":
+        return False
     if image.source not in {"FILE", "GENERATED"}:
         say(f'"{name_of(image)}" is not a single picture: "{name_of(material)}" is drawn in its plain color.')
     elif not all(image.size):  # the access loads the file if necessary
