@@ -53,6 +53,14 @@ AWAY_FROM_PARTING = (
     ((0.024, -0.01, 0.85), (0.055, 0.01, 0.82), (0.07, 0.03, 0.77)),
 )
 
+# The same, with the hair in front of the right side swept to the back.
+SWEPT = (
+    ((0.022, -0.140, 0.80), (-0.02, -0.115, 0.828), (-0.065, -0.070, 0.805), (-0.084, -0.04, 0.76)),
+    AWAY_FROM_PARTING[1],
+    ((0.022, -0.09, 0.845), (-0.03, -0.065, 0.843), (-0.075, -0.025, 0.80)),
+    *AWAY_FROM_PARTING[3:],
+)
+
 # In a layer, which keeps the combing when the guides or the mesh change.
 OFF_THE_FACE = (
     press("vellus.add_layer"),
@@ -74,9 +82,16 @@ WAVY = (
     view(*ABOVE),
     lines("vellus.draw_parting", PARTING),
     view(*FRONT),
-    lines("vellus.draw_flow", *AWAY_FROM_PARTING),
+    lines("vellus.draw_flow", *SWEPT),
     fields("guides", drape=True),
-    *OFF_THE_FACE,
+    *OFF_THE_FACE[:-1],
+    comb(  # from the parting, which is not in the middle
+        "Comb",
+        0.035,
+        ((0.03, -0.15, 0.79), (-0.04, -0.14, 0.79), (-0.10, -0.10, 0.765)),
+        *[((0.03, -0.16, z), (-0.05, -0.15, z), (-0.12, -0.11, z - 0.01)) for z in (0.76, 0.725, 0.69, 0.655, 0.62)],
+    ),
+    OFF_THE_FACE[-1],
     style("WAVY"),
     press("vellus.apply_preset", preset="BROWN"),
 )
@@ -106,8 +121,13 @@ BOB = (
     press("vellus.apply_preset", preset="DARK_BROWN"),
 )
 
-# Weights of lengths from the top to the skin, and the heights [m] of their strokes around the head.
-FADED = ((0.5, (0.806,)), (0.25, (0.786,)), (0.12, (0.768,)), (0.05, (0.748, 0.722, 0.696, 0.670, 0.645)))
+# Weights of lengths from the top to the skin, sizes [m] of their brushes, and heights [m] of strokes around the head.
+FADED = (
+    (0.5, 0.026, (0.796,)),
+    (0.25, 0.026, (0.774,)),
+    (0.12, 0.026, (0.754,)),
+    (0.05, 0.036, (0.726, 0.69, 0.655)),
+)
 SIDE_LEVELS = ((0.066, -0.120), (0.080, -0.07), (0.085, -0.02), (0.072, 0.03), (0.02, 0.06))  # (x, y) of a stroke [m]
 CORNER_LEVELS = ((0.085, -0.03), (0.080, 0.01), (0.062, 0.04), (0.03, 0.06))
 BACK_LEVELS = ((-0.075, 0.02), (-0.04, 0.05), (0.0, 0.06), (0.04, 0.05), (0.075, 0.02))
@@ -116,14 +136,14 @@ BACK_LEVELS = ((-0.075, 0.02), (-0.04, 0.05), (0.0, 0.06), (0.04, 0.05), (0.075,
 def faded(direction, places):
     """Paint bands of weights that are seen from a direction, each over the lower edge of the band above."""
     strokes = [
-        weights(weight, 0.026, [(*place, z) for row, z in enumerate(heights) for place in places[:: 1 - 2 * (row % 2)]])
-        for weight, heights in FADED
+        weights(weight, size, [(*place, z) for row, z in enumerate(heights) for place in places[:: 1 - 2 * (row % 2)]])
+        for weight, size, heights in FADED
     ]
     return (view(*direction), *strokes)
 
 
 FADE = (
-    *grown(0.035, drape=False, gravity=0.2),
+    *grown(0.035, drape=False, gravity=0.2, lift=0.75),
     view(*FRONT),
     lines(
         "vellus.draw_flow",
@@ -143,12 +163,15 @@ FADE = (
     *faded(LEFT, SIDE_LEVELS),
     *faded((0.7, 0.7, 0.1), CORNER_LEVELS),
     *faded(BACK, BACK_LEVELS),
+    view(0, 1, -0.4),
+    weights(0.05, 0.036, *[[(*place, z) for place in BACK_LEVELS] for z in (0.68, 0.655)]),
+    press("object.vertex_group_smooth", group_select_mode="ACTIVE", factor=0.5, repeat=6),
     press("object.mode_set", mode="OBJECT"),
     select("Hair"),
     fields("hair", radius=5.0e-5),
     style("PIXIE"),
     fields("Lean", amount=0.1),
-    fields("Clump", amount=0.2),
+    fields("Clump", amount=0.0),
     press("vellus.apply_preset", preset="BLACK"),
 )
 
