@@ -9,7 +9,9 @@ of each haircut, and times.
 """
 
 import argparse
+import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -29,6 +31,7 @@ from tools import build_extension, compile_kernels, desktop_blender
 
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out" / "haircuts"
+FACTS = OUT / "facts.json"
 BARE, BARE_CAT = OUT / "bare.blend", OUT / "bare_cat.blend"
 SHEET, COMPARED = (ROOT / "docs" / "manual" / f"{name}.jpg" for name in ("haircuts", "haircuts_cycles"))
 WIDTH, HEIGHT = 250, 290  # pixels of a picture
@@ -94,13 +97,20 @@ def cut(name):
     """Make a haircut in a window and save its file. Raises `RuntimeError`."""
     extension = build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
     profile, log = OUT / "profile", OUT / f"{name}.log"
-    profile.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(profile, ignore_errors=True)  # it may have an older extension
+    profile.mkdir(parents=True)
     script = ROOT / "tests" / "desktop" / "haircuts" / "in_window.py"
     words = [name, extension, OUT, BARE_CAT if name == "cat" else BARE, SHOWN, STRANDS]
     blender = desktop_blender.find_or_install()
+    before = _done_count(name)
     status = blender.run(script, words, profile=profile, log=log, limit=900, size=WINDOW_SIZE)
-    if status:
+    if status or _done_count(name) == before:
         raise RuntimeError(f"{name}: status {status}, see {log}")
+
+
+def _done_count(name):
+    """Return how often a haircut was finished."""
+    return json.loads(FACTS.read_text())["done"].count(name) if FACTS.exists() else 0
 
 
 def draw(name, by_cycles=False):

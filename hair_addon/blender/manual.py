@@ -48,8 +48,8 @@ _OPERATORS = {
     ),
     "guide_tools": (
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
-        *("smooth_guides", "lift_guides", "attract_guides", "drape_guides", "push_outside", "gather_guides"),
-        *("paint_flow", "size_flow_brush"),
+        *("smooth_guides", "lift_guides", "attract_guides", "drape_guides", "push_outside"),
+        *("draw_tie", "gather_guides", "paint_flow", "size_flow_brush"),
     ),
     "strands": ("interpolate_hair", "draw_parting", "paint_density", "update_hair"),
     "dynamics": (

@@ -178,6 +178,7 @@ MAKING = {
     "restore_guides": [(on_lost_guides, {})],
     "draw_flow": [(on_guides, {})],
     "draw_parting": [(on_hair, {})],
+    "draw_tie": [(on_guides, {})],
     "add_style": [(on_styled, {"style": "FRIZZ"})],
     "duplicate_style": [(on_styled, {})],
     "paint_style_mask": [(on_styled, {})],

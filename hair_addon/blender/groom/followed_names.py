@@ -31,6 +31,7 @@ _SETTINGS = {
     "GUIDES": (
         ("guides", "density_image", "images"),
         ("guides", "flow_lines", "objects"),
+        ("", "tie_lines", "objects"),
         ("dynamics", "colliders", "collections"),
     ),
     "HAIR": (("hair", "density_image", "images"), ("hair", "part_lines", "objects")),
@@ -103,7 +104,7 @@ def _named(datablock: Curves) -> Iterator[tuple[str, PropertyGroup, str, str]]:
     """Yield (key, property group, field, collection of `bpy.data`) of the settings that store a name."""
     state = datablock.vellus
     for owner, field, source in _SETTINGS[state.kind]:
-        group = getattr(state, owner)
+        group = getattr(state, owner) if owner else state
         if text_of(group, field):
             yield f"{owner}.{field}", group, field, source
     for item in state.styles:

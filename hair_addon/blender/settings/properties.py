@@ -307,6 +307,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     )
     cache_identity: bpy.props.StringProperty(description="Folder of the baked frames", options={"HIDDEN"})
     delivered_key: bpy.props.StringProperty(description="Baked frames that were delivered", options={"HIDDEN"})
+    tie_lines: bpy.props.StringProperty(description="Object of the curves that gather these guides", options={"HIDDEN"})
     was_combed: bpy.props.BoolProperty(description="Sculpt Mode was fitted to these guides", options={"HIDDEN"})
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})

@@ -20,6 +20,7 @@ _GUIDE_TOOLS = (
         ("attract_guides", "SNAP_ON"),
         ("drape_guides", "FORCE_FORCE"),
         ("push_outside", "MOD_SHRINKWRAP"),
+        ("draw_tie", "GREASEPENCIL"),
         ("gather_guides", "FORCE_CURVE"),
     ),
     (

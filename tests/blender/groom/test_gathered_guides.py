@@ -7,6 +7,7 @@ import pytest
 from mathutils import Matrix, Vector
 
 from hair_addon import api
+from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
 from tests.support.reading import evaluated_points, points
 
@@ -165,6 +166,17 @@ def test_cornrows_lie_on_the_surface_beside_their_curves(guides, placed):
     assert (np.abs(np.abs(tips[:, 0]) - 0.3) < 3.0 * SIZES["tie_radius"]).all()
     assert (np.sign(tips[:, 0]) == np.sign(root[is_near, 0])).all()
     assert np.linalg.norm(tips, axis=1).max() < 1.0 + 5.0 * SIZES["tie_radius"]
+
+
+def test_lines_that_begin_at_the_end_of_others_continue_them():
+    whole = np.stack([np.arange(9.0), np.zeros(9), np.zeros(9)], axis=1)
+    other = whole + np.array([0.0, 5.0, 0.0])
+    found = gathered_guides.continued([whole[6:], other, whole[:4], whole[4:6]], 1.0)
+    assert sorted(map(len, found)) == [9, 9]
+    assert any(np.array_equal(line, whole) for line in found) and any(np.array_equal(line, other) for line in found)
+    assert len(gathered_guides.continued([whole[6:], whole[:4]], 1.0)) == 2
+    ring = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.1, 0.0)])
+    assert len(gathered_guides.continued([ring, ring.copy()], 0.2)) == 1
 
 
 def test_what_cannot_be_gathered_is_refused(guides):

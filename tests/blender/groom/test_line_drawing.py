@@ -96,6 +96,28 @@ def test_flow_is_drawn_for_guides_that_are_not_combed(hair):
     assert bpy.context.mode == "OBJECT"
 
 
+def test_a_tie_is_drawn_off_the_surface_and_gather_uses_it(hair):
+    guides = bpy.data.objects["Guides"]
+    assert "Draw Tie" in buttons()
+    bpy.ops.vellus.draw_tie()
+    tie = bpy.context.object
+    assert guides.data.vellus.tie_lines == tie.name == "Tie of Sphere" and tie.mode == "EDIT"
+    assert bpy.context.tool_settings.curve_paint_settings.use_stroke_endpoints
+    draw_line(tie, (0.0, 0.6, 0.8), (0.0, 1.0, 1.2), (0.0, 1.4, -1.0))
+    assert "Stop Drawing" in buttons()
+    bpy.ops.vellus.draw_tie()
+    bpy.context.view_layer.update()
+    assert bpy.context.object == guides
+    tie.name = "Ponytail"
+    bpy.context.view_layer.update()
+    assert guides.data.vellus.tie_lines == "Ponytail"
+    before = points(guides)
+    assert bpy.ops.vellus.gather_guides("INVOKE_DEFAULT") == {"FINISHED"}
+    assert not np.array_equal(points(guides), before)
+    bpy.data.objects.remove(tie)
+    assert line_drawing.tie_of(guides.data) is None
+
+
 def test_what_is_no_curve_is_not_drawn_on(hair):
     hair.data.vellus.hair.part_lines = "Sphere"
     with pytest.raises(RuntimeError, match='"Sphere" is not a curve that can be drawn on'):

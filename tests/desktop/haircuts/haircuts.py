@@ -188,10 +188,10 @@ PONYTAIL = (
 
 BUN = (
     *grown(0.36, drape=False),
-    view(*SIDE),
-    curve("Tie", ((0.0, 0.035, 0.805), (0.0, 0.065, 0.83)), depth="CURSOR"),
+    view(*BACK),
+    lines("vellus.draw_tie", ((0.0, 0.055, 0.80), (0.0, 0.055, 0.83))),
     select("Head"),
-    press("vellus.gather_guides", line="Tie", shape="BUN"),
+    press("vellus.gather_guides", shape="BUN"),
     press("vellus.apply_preset", preset="GINGER"),
 )
 
@@ -215,20 +215,30 @@ BRAIDS = (
     press("vellus.apply_preset", preset="AUBURN"),
 )
 
+# The parts of each row from the hairline to the crown, and on to the nape.
 ROWS = tuple(
     tuple(
-        (0.078 * np.sin(tilt), 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(tilt) * np.cos(angle))
-        for angle in np.linspace(-1.35, 1.5, 24)  # from the hairline over the top to the nape
+        tuple(
+            (
+                side * (1.0 if angle < 0.8 else 1.0 - 0.17 * (angle - 0.8)),
+                0.005 + 0.098 * np.sin(angle),
+                0.745 + 0.105 * np.sqrt(1.0 - (side / 0.083) ** 2) * np.cos(angle),
+            )
+            for angle in np.linspace(*ends, 20)
+        )
+        for side in np.linspace(-0.075, 0.075, 6)
     )
-    for tilt in np.linspace(-1.15, 1.15, 8)  # from one temple to the other
+    for ends in ((-1.35, 0.7), (0.7, 2.0))
 )
 
 CORNROWS = (
     *grown(0.26, drape=False, length_variation=0.0, guide_count=1000),
-    view(0.0, 0.4, 1.0),
-    curve("Rows", *ROWS),
+    view(0.0, -0.1, 1.0),
+    lines("vellus.draw_tie", *ROWS[0], use_stroke_endpoints=False),
+    view(*BACK),
+    lines("vellus.draw_tie", *ROWS[1], use_stroke_endpoints=False),
     select("Head"),
-    press("vellus.gather_guides", line="Rows", shape="CORNROWS"),
+    press("vellus.gather_guides", shape="CORNROWS"),
     press("vellus.apply_preset", preset="BLACK"),
 )
 

@@ -137,11 +137,17 @@ def style(preset):
     return act
 
 
-def lines(button, *strokes):
-    """Press a button that begins to draw lines on the surface, draw them with the mouse, and press it again."""
+def lines(button, *strokes, **tool):
+    """Press a button that begins to draw lines on the surface, draw them with the mouse, and press it again.
+
+    tool: settings of Blender's Draw tool that are changed before.
+    """
 
     def act():
         yield from press(button)()
+        for name, value in tool.items():
+            count.fields += 1
+            setattr(bpy.context.tool_settings.curve_paint_settings, name, value)
         for places in strokes:
             yield from _stroke(places)
         yield from press(button)()

@@ -24,7 +24,7 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     if not settings.line:
         raise HairError("Pick a curve object: each of its curves begins at a tie and leads the tail.")
     segments = drawn_lines.read(datablock.surface, guides.surface, settings.line, depsgraph)
-    lines = [] if segments is None else _lines(segments)
+    lines = [] if segments is None else continued(_lines(segments), settings.tie_radius)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
     barrier = outside_guides.prepared(guides, 0.0, ())
     groups, held = np.zeros(len(guides.counts), np.int32), np.zeros(len(guides.counts), np.float32)
@@ -52,6 +52,23 @@ def _part_hair(datablock):
     for hair in curves.followers(datablock):
         if not text_of(hair.vellus.hair, "region_attribute") and not attributes.is_from_library(hair):
             hair.vellus.hair.region_attribute = gathered_groups.NAME
+
+
+def continued(lines: list[np.ndarray], distance: float) -> list[np.ndarray]:
+    """Return lines (K, 3) [m] of which those that begin at most `distance` [m] from the end of another continue it."""
+    lines = list(lines)
+    place = 0
+    while place < len(lines):
+        end = lines[place][-1]
+        near = [np.linalg.norm(line[0] - end) if line is not lines[place] else np.inf for line in lines]
+        following = int(np.argmin(near))
+        if near[following] > distance:
+            place += 1
+            continue
+        lines[place] = np.concatenate([lines[place], lines[following]])
+        del lines[following]
+        place -= following < place
+    return lines
 
 
 def _lines(segments):

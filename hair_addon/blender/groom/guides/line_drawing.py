@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Part lines and flow lines that are drawn with Blender's Draw tool, on the surface."""
+"""Part lines, flow lines and ties that are drawn with Blender's Draw tool, on the surface."""
 
 import bpy
 from bpy.types import Context, Curves, Object
@@ -22,8 +22,12 @@ _TOOL = {
 }
 
 
+# A tie begins on the surface and leaves it: its line is at the depth of its start.
+_OFF_SURFACE = {"use_stroke_endpoints": True, "surface_plane": "NORMAL_VIEW"}
+
+
 def drawn_for(active: Object | None) -> Curves | None:
-    """Return the Curves whose part lines or flow lines the active object is, in Edit Mode; None otherwise."""
+    """Return the Curves whose part lines, flow lines or ties the active object is, in Edit Mode; None otherwise."""
     if active is None or active.type != "CURVE" or active.mode != "EDIT":
         return None
     users = (datablock for datablock in bpy.data.hair_curves if active.name in _names_of(datablock))
@@ -40,6 +44,19 @@ def draw_flow(guides: Curves, context: Context) -> None:
     if guide_states.of(guides).is_combed:
         raise HairError("Combed guides do not follow flow lines: regenerate the guides first, or comb them.")
     _begin(guides, guides.vellus.guides, "flow_lines", "Flow", context)
+
+
+def draw_tie(guides: Curves, context: Context) -> None:
+    """Start drawing the curves that gather guides, or continue existing ones. Raises `HairError`."""
+    _begin(guides, guides.vellus, "tie_lines", "Tie", context)
+    for name, value in _OFF_SURFACE.items():
+        setattr(context.tool_settings.curve_paint_settings, name, value)
+
+
+def tie_of(guides: Curves) -> Object | None:
+    """Return the curve object of the ties that were drawn for guides; None if there is none."""
+    found = bpy.data.objects.get(text_of(guides.vellus, "tie_lines"))
+    return found if found is not None and found.type == "CURVE" else None
 
 
 def stop(context: Context) -> None:
@@ -93,7 +110,9 @@ def _new_lines(name, surface):
 
 def _fields_of(datablock):
     state = datablock.vellus
-    return ((state.hair, "part_lines"),) if state.kind == "HAIR" else ((state.guides, "flow_lines"),)
+    if state.kind == "HAIR":
+        return ((state.hair, "part_lines"),)
+    return (state.guides, "flow_lines"), (state, "tie_lines")
 
 
 def _names_of(datablock):

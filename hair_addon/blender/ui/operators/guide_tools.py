@@ -20,7 +20,7 @@ from ....core.grooming.ties.gather_settings import GatherSettings
 from ....core.params import declared
 from ...data import scene
 from ...groom.dynamics import guide_draping
-from ...groom.guides import gathered_guides, guide_additions, guide_tools, outside_guides
+from ...groom.guides import gathered_guides, guide_additions, guide_tools, line_drawing, outside_guides
 from ...groom.selection import guides_of, surface_of
 from ...settings import setting_properties
 from .. import setting_rows
@@ -246,10 +246,11 @@ class VELLUS_OT_gather_guides(GuideTool, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(GatherSettings)
 
     def invoke(self, context, event):
-        """Gather at the other selected curve, or open a dialog to pick one."""
+        """Gather at the other selected curve or at the ties that were drawn, or open a dialog to pick a curve."""
         others = [o for o in context.selected_objects if o.type == "CURVE" and o != context.object]
         if len(others) == 1:
             self.line = others[0].name
+        self._take_drawn(guides_of(context.object))
         if not self.line and not bpy.app.background:
             self.prefill(guides_of(context.object))
             return context.window_manager.invoke_props_dialog(self)
@@ -260,6 +261,16 @@ class VELLUS_OT_gather_guides(GuideTool, bpy.types.Operator):
         for name in _GATHERED:
             if size and not self.properties.is_property_set(name):
                 setattr(self, name, getattr(self, name) * size / _HEAD)
+
+    def change(self, context):
+        """Gather at the ties that were drawn, if no curve is picked."""
+        self._take_drawn(guides_of(context.object))
+        return super().change(context)
+
+    def _take_drawn(self, guides):
+        drawn = line_drawing.tie_of(guides)
+        if drawn is not None and not self.line:
+            self.line = drawn.name
 
     def apply(self, guides, settings, depsgraph):
         return gathered_guides.gather(guides, settings, depsgraph)

@@ -225,7 +225,7 @@ class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
 
 
 class _DrawLines(HairOperator):
-    """Mixin of operators that start or stop drawing part lines or flow lines of the active object."""
+    """Mixin of operators that start or stop drawing lines of the active object."""
 
     asked = ""  # message if no hair or guides are active
 
@@ -273,6 +273,17 @@ class VELLUS_OT_draw_flow(_DrawLines, bpy.types.Operator):
     asked = "Select guides to draw flow lines for."
     target_of = staticmethod(guides_of)
     begin = staticmethod(line_drawing.draw_flow)
+
+
+class VELLUS_OT_draw_tie(_DrawLines, bpy.types.Operator):
+    """Draw the curves that Gather leads guides along, from each tie on, with Blender's Draw tool; or stop drawing"""
+
+    bl_idname = "vellus.draw_tie"
+    bl_label = "Draw Tie"
+
+    asked = "Select guides to draw a tie for."
+    target_of = staticmethod(guides_of)
+    begin = staticmethod(line_drawing.draw_tie)
 
 
 class VELLUS_OT_select_guides(HairOperator, bpy.types.Operator):
@@ -433,6 +444,7 @@ CLASSES = (
     VELLUS_OT_comb_guides,
     VELLUS_OT_draw_parting,
     VELLUS_OT_draw_flow,
+    VELLUS_OT_draw_tie,
     VELLUS_OT_select_guides,
     VELLUS_OT_select_hair,
     VELLUS_OT_pick_hair,

@@ -25,10 +25,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         drawn = line_drawing.drawn_for(context.object)
         if drawn is not None:
-            message = "Draw lines on the surface. They take effect immediately."
-            write(layout, context, interface_text(message), "INFO")
-            name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
-            layout.operator(name, text="Stop Drawing", icon="CHECKMARK")
+            _draw_lines(layout, context, drawn)
             return
         if is_foreign(context.object):
             _draw_foreign(layout, context)
@@ -55,6 +52,19 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         if parts:
             _draw_tools(layout, context)
             _draw_combing_settings(layout, context)
+
+
+def _draw_lines(layout, context, drawn):
+    """Draw what the rows say while lines of a Curves datablock are drawn."""
+    name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
+    message = "Draw lines on the surface. They take effect immediately."
+    if line_drawing.tie_of(drawn) == context.object:
+        name = "vellus.draw_tie"
+        message = "Begin each line at its tie. For cornrows, disable the option below. Stop drawing, and use Gather."
+    write(layout, context, interface_text(message), "INFO")
+    if name == "vellus.draw_tie":
+        layout.prop(context.tool_settings.curve_paint_settings, "use_stroke_endpoints")
+    layout.operator(name, text="Stop Drawing", icon="CHECKMARK")
 
 
 def _draw_foreign(layout, context):
