@@ -46,9 +46,9 @@ TOOLS = {
 }
 
 # In the order of the menu. Gather asks for a curve, and no guide is inside the sphere for Push Outside.
-MENU = (*list(TOOLS)[:6], "push_outside", "gather_guides", *list(TOOLS)[6:])
+MENU = (*list(TOOLS)[:6], "push_outside", "draw_tie", "gather_guides", *list(TOOLS)[6:])
 
-facts |= {"tools": {}, "tubes": {}, "shelf": {}, "brush": {}}
+facts |= {"tools": {}, "tubes": {}, "shelf": {}, "brush": {}, "tie": {}}
 
 
 def guides():
@@ -280,5 +280,31 @@ def made_of_it():
     yield from grooms.shelf(of_kind("HAIR"), OUT / "library", facts["shelf"])
 
 
+def tie():
+    """Draw a tie from the sphere to the empty space beside it, gather the guides there, and undo."""
+    bpy.context.view_layer.objects.active = of_kind("GUIDES")
+    before, done = guides(), facts["tie"]
+    with in_viewport():
+        bpy.ops.vellus.draw_tie("INVOKE_DEFAULT", True)
+    yield from wait(0.3)
+    drawn, (_area, region) = bpy.context.object, viewport()
+    middle = np.array([region.x + 0.5 * region.width, region.y + 0.5 * region.height])
+    yield from drag(middle, middle + np.array([0.35 * region.width, 0.0]))
+    yield from wait(0.3)
+    take_picture(OUT / "tie.png", redraws=2)
+    with in_viewport():
+        bpy.ops.vellus.draw_tie("INVOKE_DEFAULT", True)
+    yield from wait(0.3)
+    done["lines"] = [[list(point.co)[:3] for point in spline.points] for spline in drawn.data.splines]
+    done["is stopped"] = bpy.context.object == of_kind("GUIDES") and bpy.context.mode == "OBJECT"
+    with in_viewport():
+        bpy.ops.vellus.gather_guides("INVOKE_DEFAULT", True)
+    yield from wait(0.3)
+    done["gathered"] = int((guides() != before).any(axis=(1, 2)).sum())
+    yield from key("Z", ctrl=True)
+    yield from wait(0.2)
+    done["is undone"] = bool(np.array_equal(guides(), before))
+
+
 if __name__ == "__main__":
-    take((groom, tools, comb_straight, paint_flow, made_of_it), pause=0.02)
+    take((groom, tools, comb_straight, paint_flow, made_of_it, tie), pause=0.02)

@@ -3,6 +3,7 @@
 library.
 """
 
+import numpy as np
 import pytest
 
 from tests.desktop import walks
@@ -74,3 +75,10 @@ def test_flow_is_painted_by_the_mouse(walk):
     assert brush["radius moved"] > 0.0 and brush["radius changed"] == brush["radius moved"]
     assert brush["strength moved"] > 0.0 and brush["strength changed"] == 0.0
     assert flow["without strength"] and flow["is undone"] and flow["is canceled"] and not flow["second stroke"]
+
+
+def test_a_tie_is_drawn_by_the_mouse_off_the_surface(walk):
+    tie = walk.facts["tie"]
+    (line,) = tie["lines"]
+    assert np.linalg.norm(line[0]) == pytest.approx(1.0, abs=0.05) and np.linalg.norm(line[-1]) > 1.3
+    assert tie["is stopped"] and tie["gathered"] > 40 and tie["is undone"]

@@ -215,28 +215,26 @@ BRAIDS = (
     press("vellus.apply_preset", preset="AUBURN"),
 )
 
-# The parts of each row from the hairline to the crown, and on to the nape.
-ROWS = tuple(
-    tuple(
-        tuple(
-            (
-                side * (1.0 if angle < 0.8 else 1.0 - 0.17 * (angle - 0.8)),
-                0.005 + 0.098 * np.sin(angle),
-                0.745 + 0.105 * np.sqrt(1.0 - (side / 0.083) ** 2) * np.cos(angle),
-            )
-            for angle in np.linspace(*ends, 20)
-        )
-        for side in np.linspace(-0.075, 0.075, 6)
-    )
-    for ends in ((-1.35, 0.7), (0.7, 2.0))
-)
+
+def row(aside, start, end):
+    """Return places over the scalp, nearly a sphere, from an angle to another behind the top; aside: angle from it."""
+    angles = np.linspace(start, end, 20)
+    narrow = aside * np.where(angles < 0.8, 1.0, 1.0 - 0.15 * (angles - 0.8))
+    radius = 0.088 * (1.0 - 0.05 * aside**2)
+    along = np.stack([np.sin(narrow), np.cos(narrow) * np.sin(angles), np.cos(narrow) * np.cos(angles)], axis=1)
+    return np.array([0.0, -0.045, 0.755]) + radius * along
+
+
+ASIDE = np.linspace(-0.98, 0.98, 8)  # from one side to the other
+TO_CROWN = [row(aside, 0.55 * aside**2 - 1.1, 0.75) for aside in ASIDE]  # from the hairline
+TO_NAPE = [row(aside, 0.75, 2.25) for aside in ASIDE]
 
 CORNROWS = (
     *grown(0.26, drape=False, length_variation=0.0, guide_count=1000),
     view(0.0, -0.1, 1.0),
-    lines("vellus.draw_tie", *ROWS[0], use_stroke_endpoints=False),
+    lines("vellus.draw_tie", *TO_CROWN, use_stroke_endpoints=False),
     view(*BACK),
-    lines("vellus.draw_tie", *ROWS[1], use_stroke_endpoints=False),
+    lines("vellus.draw_tie", *TO_NAPE, use_stroke_endpoints=False),
     select("Head"),
     press("vellus.gather_guides", shape="CORNROWS"),
     press("vellus.apply_preset", preset="BLACK"),

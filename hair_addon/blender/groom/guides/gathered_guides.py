@@ -24,7 +24,7 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     if not settings.line:
         raise HairError("Pick a curve object: each of its curves begins at a tie and leads the tail.")
     segments = drawn_lines.read(datablock.surface, guides.surface, settings.line, depsgraph)
-    lines = [] if segments is None else continued(_lines(segments), settings.tie_radius)
+    lines = [] if segments is None else continued(_lines(segments), 2.0 * settings.tie_radius)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
     barrier = outside_guides.prepared(guides, 0.0, ())
     groups, held = np.zeros(len(guides.counts), np.int32), np.zeros(len(guides.counts), np.float32)
