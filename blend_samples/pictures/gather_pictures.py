@@ -8,7 +8,6 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -16,6 +15,7 @@ import hair_addon
 from blend_samples.heads import head, portrait
 from blend_samples.sheets import picture_files
 from hair_addon import api
+from tests.desktop.haircuts.haircuts import ASIDE, row
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "gather.png"
 WIDTH, HEIGHT = 180, 220  # pixels of a picture
@@ -26,15 +26,7 @@ BACK = (0.0, 0.030, 0.795)  # [m] a place near the tie of ponytail and bun
 TAIL = (BACK, (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.088, 0.74), (0.0, 0.075, 0.60))
 SIDE = ((0.062, 0.012, 0.715), (0.085, 0.022, 0.700), (0.092, 0.012, 0.660), (0.088, -0.01, 0.56))
 BRAIDS = (SIDE, tuple((-x, y, z) for x, y, z in SIDE))
-_ROW_ANGLES = np.linspace(-0.75, 1.75, 40)  # from the hairline over the top to the nape
-_ROW_TILTS = np.linspace(-1.3, 1.3, 9)  # of rows from the middle of the head to its sides
-ROWS = tuple(
-    tuple(
-        (0.078 * np.sin(tilt), 0.005 + 0.098 * np.sin(angle), 0.745 + 0.105 * np.cos(tilt) * np.cos(angle))
-        for angle in _ROW_ANGLES
-    )
-    for tilt in _ROW_TILTS
-)
+ROWS = tuple(row(aside, 0.55 * aside**2 - 1.1, 2.25) for aside in ASIDE)
 LOOKS = (
     ("Ponytail", (TAIL,), {"shape": "PONYTAIL"}),
     ("Bun", ((BACK, (0.0, 0.06, 0.82)),), {"shape": "BUN", "bun_radius": 0.036}),
@@ -43,7 +35,7 @@ LOOKS = (
     (
         "Cornrows",
         ROWS,
-        {"shape": "CORNROWS", "tie_radius": 0.0055, "pitch": 0.022, "clearance": 0.0005, "tightness": 1.0},
+        {"shape": "CORNROWS", "tie_radius": 0.008, "clearance": 0.0005, "tightness": 1.0},
     ),
 )
 

@@ -220,7 +220,7 @@ def row(aside, start, end):
     """Return places over the scalp, nearly a sphere, from an angle to another behind the top; aside: angle from it."""
     angles = np.linspace(start, end, 20)
     narrow = aside * np.where(angles < 0.8, 1.0, 1.0 - 0.15 * (angles - 0.8))
-    radius = 0.088 * (1.0 - 0.05 * aside**2)
+    radius = 0.088 * (1.0 - 0.1 * aside**2)
     along = np.stack([np.sin(narrow), np.cos(narrow) * np.sin(angles), np.cos(narrow) * np.cos(angles)], axis=1)
     return np.array([0.0, -0.045, 0.755]) + radius * along
 
