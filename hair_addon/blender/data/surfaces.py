@@ -7,13 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core import geometry
+from ...core import dynamics, geometry
 from ...core.geometry.mesh import Faces, TriMesh, check_mesh
 from ...core.geometry.mirror import Mirror
 from ...core.kernels.checks import require_indices
 
 # Cached values that do not depend on posed vertices, and are copied to another pose.
-_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology", "turned", "turned_topology", "cage_vertices")
+_AT_REST = (
+    "to_local_axes",
+    "local_mesh",
+    "shape",
+    "extent",
+    "topology",
+    "is_open",
+    "turned",
+    "turned_topology",
+    "cage_vertices",
+)
 
 _RESIZED = 1.3  # a factor of size beyond the change by smoothing a cage
 
@@ -235,6 +245,11 @@ class Surface:
     def of_cage(self, values):
         """Values of vertices → values of the cage's vertices, the same at every level of subdivision; None → None."""
         return values if values is None else values[: self.cage_size]
+
+    @cached_property
+    def is_open(self):
+        """Whether the mesh has holes. Raises the `HairError` of `checked_triangles`."""
+        return bool(dynamics.collision.closed_parts.rims(self.mesh).any())
 
     @cached_property
     def topology(self):

@@ -313,6 +313,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
+    is_on_open: bpy.props.BoolProperty(description="Whether the surface has holes", options={"HIDDEN"})
     cage_topology: bpy.props.StringProperty(
         description="Faces before subdivision that the stored roots refer to", options={"HIDDEN"}
     )

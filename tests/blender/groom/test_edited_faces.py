@@ -172,6 +172,23 @@ def test_a_remeshed_surface_has_its_strands_at_the_nearest_points(hair):
     assert "400 strands" in bpy.data.objects["Hair Guides"].data.vellus.status
 
 
+def test_a_remesh_that_makes_two_walls_of_an_open_surface_is_explained(hair):
+    """Another remesh, of the surface that is closed now, is not."""
+    skin = bpy.data.objects["Skin"]
+    state = bpy.data.objects["Hair Guides"].data.vellus
+    assert state.is_on_open
+    skin.data.remesh_voxel_size = 0.05
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.object.voxel_remesh()
+    bpy.context.view_layer.update()
+    state = bpy.data.objects["Hair Guides"].data.vellus
+    assert state.status.startswith('"Skin" had holes that its new faces close') and not state.is_on_open
+    skin.data.remesh_voxel_size = 0.04
+    bpy.ops.object.voxel_remesh()
+    bpy.context.view_layer.update()
+    assert "400 strands" in bpy.data.objects["Hair Guides"].data.vellus.status
+
+
 def test_a_mask_that_is_painted_in_the_same_edit_places_strands_again(hair):
     skin = bpy.data.objects["Skin"]
     half = [vertex.index for vertex in skin.data.vertices if vertex.co.x < -0.05]

@@ -131,7 +131,8 @@ def write_roots(curves, surface, roots, normals=None, firsts=None):
     for name, vertices in zip(stored_roots.VERTICES, surface.root_vertices(roots).T, strict=True):
         attributes.write(curves, name, "INT", "CURVE", vertices)
     curves.surface_uv_map = surface.uv_map
-    curves.vellus.topology = surface.topology
+    if curves.vellus.topology != surface.topology:
+        curves.vellus.topology, curves.vellus.is_on_open = surface.topology, surface.is_open
     for user in bpy.data.objects:
         if user.data == curves and user.library is None:
             is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None

@@ -21,6 +21,9 @@ _ROOTED_AGAIN = {
     "HAIR": 'Faces of "{name}" were deleted: {strands} strands moved to the nearest points.',
 }
 
+# Voxel Remesh makes two walls of a surface with holes: hair would grow on the inner wall too.
+_CLOSED = '"{name}" had holes that its new faces close, as Voxel Remesh does: undo, fill the holes, and remesh again.'
+
 
 class Followed(enum.Enum):
     """The change that strands followed: none, an applied transform, which moves nothing in the world, or an edit.
@@ -63,10 +66,12 @@ def follow_surface(
         if not follows_edits or frame_faces.differs_by_frame(guide_curves, surface):
             return Followed.NOTHING
         curves.require_not_linked(guide_curves)
+        was_open = state.is_on_open
         lost, lost_between = edited_faces.reroot(guide_curves, surface, depsgraph)
         if lost or lost_between:
             strand_count = lost_between if state.kind == "GUIDES" else lost
-            sentence = _ROOTED_AGAIN[state.kind]
+            is_remeshed = was_open and lost == len(guide_curves.curves) and not surface.is_open
+            sentence = _CLOSED if is_remeshed else _ROOTED_AGAIN[state.kind]
             state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
         return Followed.EDITED
     if before is not None and before.shape != surface.rest.shape:
