@@ -5,8 +5,8 @@
 
 Prints the error of means of 12 × 12 pixels in display levels of 255, the structural similarity, the ratio of mean
 colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS: factors of the number of paths, the weight of larger
-voxels in paths (0: by the variance), and a factor of the number of voxels. Cycles' pictures are the means of two
-halves, whose difference is its own noise.
+voxels in paths (0: by the number of paths), and a factor of the number of voxels; "live" is the light of a viewport
+after one second at rest. Cycles' pictures are the means of two halves, whose difference is its own noise.
 """
 
 import argparse
@@ -26,6 +26,7 @@ from blend_samples.sheets import picture_pairs
 from hair_addon.blender.data import scene as data_scene
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene, film, light_paths
+from hair_addon.blender.render.viewport import live_light
 from hair_addon.blender.settings import preferences
 from hair_addon.core.shading.light_paths import gather, strand_grid, voxel_means
 
@@ -33,6 +34,7 @@ VARIANTS = (
     *("1:128:1", "1:0:1", "1:32:1", "1:8:1", "4:128:1", "4:0:1", "4:32:1", "4:8:1"),
     *("16:128:1", "16:0:1", "16:8:1", "64:0:1", "64:8:8"),
 )
+PAUSE, MOST = 1.0 / 60.0, 20.0  # [s] after a redraw, in which a window leaves Python to other threads; at rest
 _followed, _prior_of = [], voxel_means.prior_of
 _started = time.perf_counter()
 
@@ -50,7 +52,7 @@ def main():
     parser.add_argument("--samples", type=int, default=1024, help="samples per pixel of each half of Cycles' pictures")
     parser.add_argument("--cycles", default="CPU", choices=("CPU", "CUDA", "OPTIX", "METAL"), help="Cycles' device")
     parser.add_argument("--device", default="cpu", help="the Warp device that follows paths")
-    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS")
+    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS, or live")
     parser.add_argument("--limit", type=float, default=130.0, help="time [s] after which no further scene begins")
     parser.add_argument("--out", type=Path, help="write all pictures to this .npz file")
     options = parser.parse_args()
@@ -106,28 +108,50 @@ def by_vellus(variant, options):
     """Return (pixels as of `random_scenes.by_vellus`, time of the light [s], variance of a path's light relative to the
     square of its mean, number of paths) with the settings of a variant.
     """
-    factor, prior, voxels = map(float, variant.split(":"))
-    voxel_means.prior_of = (lambda _variance: prior) if prior else _prior_of
     blender_scene, depsgraph = bpy.context.scene, data_scene.present_depsgraph()
     size = (options.size, options.size)
     camera = data_scene.read_camera(blender_scene, depsgraph, *size)
     drawn = drawn_scene.read(blender_scene, bpy.context.view_layer, depsgraph)
-    default_voxels, most_voxels = strand_grid.build.__defaults__, strand_grid.MOST_VOXELS
-    strand_grid.build.__defaults__ = default_voxels[0], int(voxels * default_voxels[1]), *default_voxels[2:]
-    strand_grid.MOST_VOXELS = int(np.ceil(voxels ** (1.0 / 3.0)) * most_voxels)
-    started = time.perf_counter()
-    try:
-        count = int(factor * light_paths.path_count(blender_scene, size))
-        lit = light_paths.with_grid(drawn, *camera, count)
-    finally:
-        strand_grid.build.__defaults__, strand_grid.MOST_VOXELS = default_voxels, most_voxels
-    seconds, light = time.perf_counter() - started, _followed[-1] if _followed else None
+    count = light_paths.path_count(blender_scene, size)
+    lit, seconds = at_rest(drawn, camera, count) if variant == "live" else traced(drawn, camera, count, variant)
+    light = _followed[-1] if _followed else None
     variance, taken = (0.0, 0) if light is None else (light.wanted * gather._KNOWN**2 * light.taken, light.taken)
     picture = film.Film(size, 4, ("Combined",), True, 2.0 * blender_scene.render.filter_size)
     for turn in range(blender_scene.vellus.sample_count // 16):
         with drawing.ALONE:
             picture.add_pass(lit, *camera, size, turn)
     return picture.read()["Combined"], seconds, variance, taken
+
+
+def at_rest(drawn, camera, count):
+    """Return (scene as a viewport shows it after one second at rest, time [s] until all paths are traced)."""
+    voxel_means.prior_of = _prior_of
+    live, started, found = live_light.LiveLight(), time.perf_counter(), None
+    while not live.is_done or found is None:
+        lit = live.lit(drawn, camera, count, time.monotonic())
+        time.sleep(PAUSE)
+        seconds = time.perf_counter() - started
+        found = lit if found is None and (live.is_done or seconds > live_light._REST + 1.0) else found
+        if seconds > MOST:
+            break
+    live.stop()
+    live.wait()
+    return found, seconds
+
+
+def traced(drawn, camera, count, variant):
+    """Return (scene lit by paths with the settings of a variant, time [s])."""
+    factor, prior, voxels = map(float, variant.split(":"))
+    voxel_means.prior_of = (lambda _paths: prior) if prior else _prior_of
+    default_voxels, most_voxels = strand_grid.build.__defaults__, strand_grid.MOST_VOXELS
+    strand_grid.build.__defaults__ = default_voxels[0], int(voxels * default_voxels[1]), *default_voxels[2:]
+    strand_grid.MOST_VOXELS = int(np.ceil(voxels ** (1.0 / 3.0)) * most_voxels)
+    started = time.perf_counter()
+    try:
+        lit = light_paths.with_grid(drawn, *camera, int(factor * count))
+    finally:
+        strand_grid.build.__defaults__, strand_grid.MOST_VOXELS = default_voxels, most_voxels
+    return lit, time.perf_counter() - started
 
 
 class _Followed(gather.PathSums):
