@@ -38,8 +38,9 @@ _MOST_ASKED = 20  # requested redraws after which a region that was not drawn co
 _SHARES = 16  # number of shares of a picture's paths, each followed between two redraws
 _RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
 _LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
-# After a picture's paths, shares grow, so that the picture starts again less often: part of the paths so far, maximum.
-_GROWTH, _MOST_GROWN = 0.25, 131_072
+# After a picture's paths, shares grow, so that the picture starts again less often: part of the paths so far on a
+# processor and on a GPU, and maximum on a GPU, which draws nothing in that time.
+_GROWTH, _GROWTH_ON_GPU, _MOST_ON_GPU = 1.0, 0.25, 131_072
 _HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
 _NICE = 10  # priority of the thread, if the system has priorities of threads
 _STILL = 0.01  # fraction of the hair's radius by which strands may move and still count as still
@@ -133,7 +134,7 @@ def is_next(context, pass_count):
     live = light_cache.get(context.region.as_pointer())
     if live is None or pass_count < _PASSES or scene_time.is_playing() or running.is_rendering():
         return False
-    return live.is_waiting
+    return live.is_waiting and not live.is_slow
 
 
 def _interrupt():
@@ -327,6 +328,11 @@ class LiveLight:
         return (self._job is not None or not self._is_done) and self.asked < _MOST_ASKED
 
     @property
+    def is_slow(self):
+        """Whether the picture has its paths, and more paths take long, on a processor."""
+        return 0 < self._goal <= self._tried and self._paths is not None and self._paths.grid.device.is_cpu
+
+    @property
     def is_done(self):
         """Whether all paths of the picture are followed."""
         return self._is_done and self._job is None
@@ -404,7 +410,12 @@ class LiveLight:
     def _share_of(self, goal):
         """Return the number of paths of the next share; goal: paths of the picture."""
         share = min(max(goal // _SHARES, _LEAST_SHARE), _MOST_SHARE)
-        return share if self._tried < goal else min(max(share, int(_GROWTH * self._tried)), _MOST_GROWN)
+        if self._tried < goal or self._paths is None:
+            return share
+        grown = int(_GROWTH * self._tried)
+        if not self._paths.grid.device.is_cpu:
+            grown = min(int(_GROWTH_ON_GPU * self._tried), _MOST_ON_GPU)
+        return max(share, min(grown, int(self._most - self._tried)))
 
     def _follow(self, work, progress):
         """In the thread: (paths of the share, shares by voxel); None if no strand is in sight."""

@@ -107,7 +107,7 @@ def test_paths_are_added_at_rest_while_voxels_are_noisy(view, monkeypatch):
     live = live_light.LiveLight()
     at_rest(live, read(), camera)
     most = light_paths.most_paths(live._paths.grid.device, live._goal)
-    assert most > 2 * live._goal and most <= live._paths.taken < 1.5 * most
+    assert live.is_slow and most > 2 * live._goal and most <= live._paths.taken < 2.0 * most
 
 
 def test_the_picture_goes_over_to_paths_in_steps(view):
@@ -296,7 +296,7 @@ def test_a_region_that_waits_for_another_is_not_redrawn(view, region, monkeypatc
 
 
 def test_a_picture_is_refined_once_its_light_is_known(view, region, monkeypatch):
-    """A picture is refined once its light is known; until then it restarts with each share and has few passes."""
+    """A picture is refined once it has its paths; until then it restarts with each share and has few passes."""
     camera, read = view
     context, _timers = region
     monkeypatch.setattr(live_light, "_SHARES", 2)
