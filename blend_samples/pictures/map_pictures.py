@@ -4,7 +4,8 @@
 Writes docs/manual/maps.jpg. From the top: a tiger's coat (an image of colors), a fade (weights of the length), a
 beard that thins out (weights of length and thickness) and bleached ends (a random number for each clump). Writes
 docs/manual/more_maps.jpg: curls on one side (weights of the radius and the pitch of curls), a calico coat (a color ramp
-of a mask) and brows that thin out. Each map is made by the buttons of the panel, and filled as brushes would.
+of a mask) and brows that thin out. Writes docs/manual/wet_map.jpg: hair that is wet on one side (weights of the
+wetness). Each map is made by the buttons of the panel, and filled as brushes would.
 """
 
 import argparse
@@ -174,9 +175,22 @@ def one_sided(strands):
     return seen_weights(head_object, item.source)
 
 
+def wet_side(strands):
+    """Return hair that is wet on one side of the head."""
+    head_object = ten_grooms.dressed_head()
+    hair = head_grooms.long_wavy(head_object, int(30_000 * strands))
+    look = hair.vellus.appearance
+    look.parametrization, look.melanin, look.redness, look.wetness = "MELANIN", 0.22, 0.2, 1.0
+    weights = part(places_of(head_object)[:, 0], 0.02, 0.04)
+    paint(hair, "look.wetness", "GROUP", lambda item: paint_weights(head_object, item.source, weights))
+    see("Long Wavy")
+    return seen_weights(head_object, hair.vellus.maps[-1].source)
+
+
 SHEETS = {
     "maps.jpg": {"tiger": tiger, "fade": fade, "beard": beard, "bleached": bleached},
     "more_maps.jpg": {"one_sided": one_sided, "calico": calico, "thin_brows": thin_brows},
+    "wet_map.jpg": {"wet_side": wet_side},
 }
 
 

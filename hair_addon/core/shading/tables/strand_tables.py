@@ -78,11 +78,26 @@ def dual_among(slices: absorption_slices.Slices, around: np.ndarray) -> np.ndarr
 def returned(slices: absorption_slices.Slices) -> np.ndarray:
     """Return `StrandTables.returned`."""
     moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (4, T, K)
-    roots = np.linspace(slices.range.low, slices.range.high, _RETURN_STEPS)
-    below, fraction = absorption_slices.slice_of(np.square(roots), slices.range.low, slices.range.high, len(slices.n))
-    # The second moment may be negative, so no geometric mean; slices are close enough for an arithmetic one.
-    mixed = moments[..., below] * (1.0 - fraction) + moments[..., below + 1] * fraction
-    return np.ascontiguousarray(mixed.transpose(2, 1, 0), np.float32)
+    places = np.linspace(0.0, len(slices.n) - 1.0, _RETURN_STEPS)
+    return np.ascontiguousarray(
+        _smoothly_between(moments, places, slices.range.low == 0.0).transpose(2, 1, 0), np.float32
+    )
+
+
+def _smoothly_between(values, places, is_even):
+    """Return values (..., N) at places (M,) from 0 to N - 1 along the last axis, by cubics with parabolas' slopes.
+
+    is_even: whether values are even about the first place, as functions of sigma_a are about zero in its square root.
+    Moments are smooth in sqrt(sigma_a), in which slices are evenly spaced; lines would be off by 1.5/255.
+    """
+    slopes = np.gradient(values, axis=-1, edge_order=2 if values.shape[-1] > 2 else 1)
+    if is_even:
+        slopes[..., 0] = 0.0
+    below = np.minimum(places.astype(int), values.shape[-1] - 2)
+    x = places - below
+    ends, slopes = (np.stack([each[..., below], each[..., below + 1]]) for each in (values, slopes))
+    from_first = (1.0 + 2.0 * x) * (1.0 - x) ** 2 * ends[0] + x * (1.0 - x) ** 2 * slopes[0]
+    return from_first + x**2 * ((3.0 - 2.0 * x) * ends[1] - (1.0 - x) * slopes[1])
 
 
 def at_absorptions(values: np.ndarray, slices: absorption_slices.Slices, sigma_a: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.shading.fibre import strand_variation
-from hair_addon.core.shading.tables import look_tables, lookup_tables, radial_tables
+from hair_addon.core.shading.tables import albedo, look_tables, lookup_tables, radial_tables
 
 SETTINGS = lookup_tables.Settings(mode="energy", size=64)
 VARIATION = strand_variation.Settings()
@@ -54,3 +54,15 @@ def test_light_passed_on_is_the_mean_over_strands(tables):
     radial = np.where(np.arange(20) < 5, 0.4375, 0.5)
     parts = [np.stack(at(value).mean_parts(some[radial == value])) for value in (0.4375, 0.5)]
     np.testing.assert_allclose(tables.mean_parts(some, radial), 0.25 * parts[0] + 0.75 * parts[1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("root", [0.03, 0.0625, 0.3, 0.69])
+def test_strands_in_even_light_have_the_light_of_their_own_tables(root):
+    """In even light a strand between two slices is within 0.6/255 of tables that are baked for its absorption."""
+    baked = look_tables.bake(SETTINGS, VARIATION, look_tables.covering(0.0, 1.0))
+    exact = albedo.azimuthal_moments(lookup_tables.bake(replace(SETTINGS, sigma_a=(root**2,) * 3)))[0, :, 0]
+    rows = baked.returned[..., 0]
+    place = root / baked.slices.range.high * (len(rows) - 1)
+    below = int(place)
+    found = rows[below] + (place - below) * (rows[below + 1] - rows[below])
+    np.testing.assert_allclose(found, exact, atol=0.6 / 255.0)
