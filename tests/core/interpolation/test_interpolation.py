@@ -179,6 +179,25 @@ def test_long_hair_does_not_spread_beyond_its_guides(rng, length):
     assert np.mean((least < 0.5 * chords * length)[is_beside]) == pytest.approx(float(length > 0.1), abs=0.2)
 
 
+@pytest.mark.parametrize("edge", [15.0, 28.0])
+def test_parallel_hair_stays_parallel_across_a_sharp_edge(rng, edge):
+    """At sharp edges of less than 29°, long hair moves aside by at most a quarter of the distance of its guides."""
+    turn, length = np.radians(edge), 0.3
+    places = rng.uniform(-0.1, 0.1, (900, 2))
+    is_wall, is_guide = places[:, 0] > 0.0, rng.random(900) < 0.15
+    height = np.where(is_wall, -np.sin(turn) * places[:, 0], 0.0)
+    roots = np.stack([np.where(is_wall, np.cos(turn), 1.0) * places[:, 0], places[:, 1], height], axis=1)
+    normals = np.where(is_wall[:, None], (np.sin(turn), 0.0, np.cos(turn)), (0.0, 0.0, 1.0))
+    hanging = np.linspace(0.0, length, 9)[:, None] * unit(np.array([1.0, 0.2, 0.3]))
+    guides = roots[is_guide][:, None] + hanging
+    roots, normals, guide_normals = roots[~is_guide], normals[~is_guide], normals[is_guide]
+    strands = strands_between(roots, normals, guides, guide_normals) - roots[:, None]
+    moved = np.linalg.norm(strands[:, -1] - hanging[-1], axis=1)
+    weights = weights_of(roots, guides[:, 0], None, 8)
+    distance = (weights * np.linalg.norm(roots[:, None] - guides[:, 0], axis=2)).sum(axis=1)
+    assert np.all(moved <= SPREAD * distance + 0.01 * length) and moved.max() > 0.1 * SPREAD * distance.max()
+
+
 def test_the_order_of_strands_does_not_matter(scene, rng):
     order = rng.permutation(200)
     shuffled = scene | {"roots": scene["roots"][order], "normals": scene["normals"][order]}
