@@ -34,7 +34,7 @@ class Job:
     """
 
     def __init__(self, folder, values):
-        self._folder, self._attempts, self._error = folder, 0, ""
+        self._folder, self._attempts, self._error, self._has_ended = folder, 0, "", False
         (folder / VALUES).write_text(json.dumps(values), "utf-8")
         self._send()
 
@@ -50,7 +50,8 @@ class Job:
         """Whether the job has ended, or its process."""
         # A process that ends writes nothing after this test.
         is_running = self._process.is_running
-        if (self._folder / ENDED).is_file():
+        self._has_ended = self._has_ended or (self._folder / ENDED).is_file()  # its folder may be removed then
+        if self._has_ended:
             return True
         if is_running or self._error:
             return not is_running

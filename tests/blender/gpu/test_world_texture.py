@@ -5,6 +5,7 @@ import math
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import bpy
@@ -272,6 +273,22 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_ble
     other_blender(SLEEP)
     lights.read_world(scene, waits=False)
     assert [is_error for _sentence, is_error in picture_jobs.sentences()] == [False]
+
+
+def test_a_render_may_wait_for_the_job_of_a_view(scene, monkeypatch, other_blender):
+    """Two threads that wait for one job find its file in place, without an error."""
+    mixed_world(scene)[0].default_value = (0.31, 0.0, 0.0)
+    sent, complaint = [], background_process.Job.complaint
+    monkeypatch.setattr(background_process._Process, "send", lambda _self, folder: sent.append(folder))
+    monkeypatch.setattr(background_process.Job, "complaint", lambda job: (time.sleep(0.05), complaint(job))[1])
+    other_blender(SLEEP)
+    assert world_panoramas.file_of(scene.world, 1.0, waits=False) is None
+    (job,) = picture_jobs.running()
+    (sent[0] / "0.exr").write_bytes(b"")
+    (sent[0] / background_process.ENDED).write_text("")
+    with ThreadPoolExecutor(2) as threads:
+        assert list(threads.map(job.is_ended, (True, True))) == [True, True]
+    assert not job.reasons and job.paths[0].is_file()
 
 
 def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, other_blender):

@@ -2,8 +2,10 @@
 """One other process runs all jobs. It ends when it is idle, and with the process that started it."""
 
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import textwrap
 import threading
 import time
@@ -37,9 +39,7 @@ def job(tmp_path, monkeypatch):
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", OTHER])
 
     def start(kind):
-        folder = tmp_path / f"{len(list(tmp_path.iterdir()))}"
-        folder.mkdir()
-        return background_process.Job(folder, {"kind": kind})
+        return background_process.Job(Path(tempfile.mkdtemp(dir=tmp_path)), {"kind": kind})
 
     yield start
     background_process.end()
@@ -52,6 +52,8 @@ def test_jobs_have_one_process(job):
     for one, complaint in ((works, ""), (refused, "too bright")):
         one.wait(20.0)
         assert one.complaint() == complaint
+    shutil.rmtree(works._folder)
+    assert works.is_ended()
     crash, queued = job("crash"), job("works")
     crash.wait(20.0)
     queued.wait(20.0)

@@ -3,6 +3,7 @@
 
 import shutil
 import tempfile
+import threading
 import weakref
 from pathlib import Path
 
@@ -49,6 +50,7 @@ class PictureJob:
 
     def __init__(self, kind, owners, values):
         self.kind, self.reasons, self._names = kind, {}, {path: name_of(one) for path, one in owners.items()}
+        self._lock = threading.Lock()
         sources = [(library_of(one), one.name) for one in owners.values()]
         try:
             # Beside the files, as a file cannot be renamed to another file system.
@@ -79,11 +81,17 @@ class PictureJob:
 
     def is_ended(self, waits):
         """Whether it has ended; waits: wait for its end. Then each file is in its place, or there is a reason."""
-        if self._job is not None and waits:
-            self._job.wait(_PATIENCE)
-        if self._job is None or not self._job.is_ended():
-            return self._job is None
-        complaint, self._job = self._job.complaint(), None
+        job = self._job
+        if job is not None and waits:
+            job.wait(_PATIENCE)
+        with self._lock:  # a render in its thread may wait for the job of a view
+            if self._job is not None and job.is_ended():
+                self._place(job.complaint())
+                self._job = None
+        return self._job is None
+
+    def _place(self, complaint):
+        """Move the files of the ended job into their places; complaint: why it has failed, empty if it has not."""
         for index, path in enumerate(self._names):
             made = self._folder / f"{index}{path.suffix}"
             try:
@@ -94,7 +102,6 @@ class PictureJob:
                 self.reasons[path] = told or cause_of(error)
         self._drop.detach()
         self._remove()
-        return True
 
     def sentences(self):
         """Return (translated sentence, whether it is an error) of each file that is being made or cannot be made."""
