@@ -47,10 +47,10 @@ CAMERAS = {
     "wavy": _QUARTER,
     "bob": (-0.65, -1.2, 0.80),
     "fade": (0.95, -0.85, 0.80),
-    "bun": _LEFT_BEHIND,
+    "bun": (0.75, 1.10, 0.95),
     "ponytail": _LEFT_BEHIND,
     "braids": (0.35, -1.30, 0.82),
-    "cornrows": (0.75, -0.95, 1.15),
+    "cornrows": (1.1, -0.55, 1.1),
     "beard": (0.60, -1.25, 0.72),
     "cat": (0.75, -0.95, 0.42),
 }

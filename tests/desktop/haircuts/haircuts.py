@@ -236,8 +236,8 @@ CORNROWS = (
     view(*BACK),
     lines("vellus.draw_tie", *TO_NAPE, use_stroke_endpoints=False),
     select("Head"),
-    press("vellus.gather_guides", shape="CORNROWS"),
-    press("vellus.apply_preset", preset="BLACK"),
+    press("vellus.gather_guides", shape="CORNROWS", tie_radius=0.0065),
+    press("vellus.apply_preset", preset="DARK_BROWN"),
 )
 
 BEARD = (
