@@ -212,7 +212,7 @@ OTHERS = {
     *("remove_look", "remove_style", "remove_style_preset", "render_picture", "save_look", "save_style_preset"),
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),
     *("gather_guides", "paint_flow", "size_flow_brush", "update_hair", "use_points", "use_uv_map"),
-    *("save_selection", "select_saved", "remove_selection"),
+    *("save_selection", "select_saved", "remove_selection", "retry_baking"),
 }
 CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
 

@@ -54,9 +54,9 @@ class VellusStyle(bpy.types.PropertyGroup):
             items=[(kind, LABELS[kind], DESCRIPTIONS[kind]) for kind in KINDS], options={"HIDDEN"}
         ),
         # Of a preset whose locks were enlarged, as there were few strands; zero without.
-        "lock_wanted": bpy.props.FloatProperty(options={"HIDDEN"}),
-        "lock_enlarged": bpy.props.FloatProperty(options={"HIDDEN"}),
-        "lock_strands": bpy.props.IntProperty(options={"HIDDEN"}),
+        "lock_wanted": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),
+        "lock_enlarged": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),
+        "lock_strands": bpy.props.IntProperty(min=0, options={"HIDDEN"}),
         **{kind.lower(): bpy.props.PointerProperty(type=_GROUPS[kind]) for kind in KINDS},
     }
 
