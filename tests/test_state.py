@@ -10,6 +10,7 @@ STATE = {
     "blender/data/whole_changes.py: _open": "the end of each step of a change, a context",
     "blender/groom/guides/brushes.py: _fitted": "nobody: Blender's brushes and what was set in them outlive a file",
     "blender/groom/dynamics/guide_baking.py: _baking": "the end of baking, on every way out",
+    "blender/host/background_process.py: _running": "unregister",
     "blender/host/cli_command.py: _command": "unregister",
     "blender/host/memory.py: _asks": "asking, a context",
     "blender/host/running.py: _job": "end",
@@ -23,6 +24,7 @@ STATE = {
     "blender/render/frames/engine.py: _listener": "listening, a context",
     "blender/render/viewport/live_light.py: _jobs": "the end of each share, at the latest unregister",
     "blender/render/viewport/viewport.py: _handles": "unregister",
+    "blender/ui/brush_circle.py: _held": "the end of changing a brush by the mouse, on every way out",
     "blender/ui/look_previews.py: _previews": "unregister",
     # Kernels stay loaded as long as Python runs.
     "core/kernels/kernel_cache.py: _choosing": "nobody: a lock",

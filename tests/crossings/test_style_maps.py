@@ -228,6 +228,7 @@ def test_parented_surface(curls, scale):
     size = abs(np.prod(scale)) ** (1.0 / 3.0)
     group = curls.data.vellus.styles[0].curl
     group.radius, group.pitch = HIGH * size, 0.2 * size
+    bindings.invalidate(curls.data)  # equal styles keep hair at the scale that it was bound at
     curls.data.vellus.is_stale = True
     update()
     high, low = points(curls), with_radius(curls, LOW * size)
