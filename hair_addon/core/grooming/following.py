@@ -47,9 +47,15 @@ def strands_now(
     fill and return, None for a new one; under_way: called when the kernels of the weighted sums run.
     """
     points = _weighted_sum(binding, guides, weights, out, under_way)
-    if styling is not None:
-        centres = [level.binding for level in styling.levels]
-        styling.apply(points, [(_weighted_sum(own, guides, weights_now(own, guides)), None) for own in centres])
+    if styling is None:
+        return points
+    of_levels = [level.binding for level in styling.levels]
+    if styling.used_centres is None:
+        styling.apply(points, [(_weighted_sum(own, guides, weights_now(own, guides)), None) for own in of_levels])
+    else:
+        used = styling.used_centres
+        sums, _weights = _sums_of_some(list(zip(of_levels, used, strict=True)), guides)
+        styling.apply(points, list(zip(sums, used, strict=True)))
     return points
 
 

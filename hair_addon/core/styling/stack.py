@@ -107,6 +107,16 @@ class Styling:
             read[:row] = [_present(np.append(*pair)) for pair in zip(read[:row], above, strict=True)]
         return read
 
+    @cached_property
+    def used_centres(self) -> list[np.ndarray] | None:
+        """`centres_of` all strands, where sizes of locks differ between strands: most centers have none there.
+
+        None if all centers are to be styled.
+        """
+        if not any(tree.variants for tree, _level in self.tree_levels):
+            return None
+        return self.centres_of(np.arange(len(self.data.normals)))
+
     def _keep_centres(self, centres, rows, first):
         """Write the points and arc lengths of a level's centers to the array that the kernel reads."""
         if not len(centres):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hair_addon.core.grooming import following
 from hair_addon.core.styling import braid, clump, curl, wet
 from hair_addon.core.styling.masks import Inputs
 from hair_addon.core.styling.program import tree_settings
@@ -96,6 +97,19 @@ def test_many_sizes_are_few_trees(hair, places):
     step = trees[1] / trees[0]
     assert max(ratios.max(), 1.0 / ratios.min()) <= step**0.5 * 1.0001
     assert np.isfinite(hair.styled(style, inputs=Inputs(numbers={(0, "size"): number}))).all()
+
+
+def test_only_centers_with_strands_are_styled(hair, places):
+    """Where sizes differ, only centers that strands need are styled; strands have the bits of all centers' styles."""
+    number = NumberMap(lambda roots, _ids, _clumps: 0.02 + 0.2 * np.abs(places(roots)))
+    styling = hair.bound(clump.Settings(levels=2), inputs=Inputs(numbers={(0, "size"): number}))
+    guides = styling.guides(hair.guides)
+    weights = following.weights_now(hair.binding, guides)
+    used = styling.used_centres
+    assert all(len(rows) < len(level.binding.roots) for rows, level in zip(used, styling.levels, strict=True))
+    found = following.strands_now(hair.binding, guides, weights, styling).numpy()
+    styling.used_centres = None  # as for hair with locks of one size
+    np.testing.assert_array_equal(found, following.strands_now(hair.binding, guides, weights, styling).numpy())
 
 
 def test_another_crossover_has_the_same_sites(hair):
