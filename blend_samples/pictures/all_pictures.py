@@ -82,7 +82,7 @@ OTHERS = {
     "dynamics_settings": ("manual/dynamics_*.png",),
     "cards": ("manual/cards.jpg",),
     "haircuts": ("manual/haircuts*.jpg",),
-    "maps": ("manual/maps.jpg", "manual/more_maps.jpg"),
+    "maps": ("manual/maps.jpg", "manual/more_maps.jpg", "manual/wet_map.jpg"),
     "dynamics": ("dynamics_*.png",),
     "five_minutes": ("five_minutes/*.png",),
     "curly_hair": ("manual/curly_*.png",),
