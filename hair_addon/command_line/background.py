@@ -10,10 +10,12 @@ blender = lazy.Package("..blender", __package__)
 
 
 def add(verbs):
-    """Add the command, without options."""
-    verbs.add_parser("background").set_defaults(run=run, json=True, quiet=False, verbose=False)
+    """Add the command and its option."""
+    background = verbs.add_parser("background")
+    background.add_argument("folder", help="for temporary files")
+    background.set_defaults(run=run, json=True, quiet=False, verbose=False)
 
 
-def run(_given, _console):
+def run(given, _console):
     """Run jobs whose folders are lines of standard input."""
-    blender.io.pictures.background_jobs.serve(0)
+    blender.io.pictures.background_jobs.serve(0, given.folder)

@@ -2,7 +2,8 @@
 """Another Blender without a window, which runs jobs of this Blender one after the other while this one goes on.
 
 The first job starts it. It ends when it has had no job for some minutes, and with this process, also if that is killed.
-A job is a folder with its values. The other process reads the path of the folder, and writes files into it.
+A job is a folder with its values. The other process reads the path of the folder, and writes files into it. Temporary
+files of the other process are in a folder that is removed after its end.
 """
 
 import contextlib
@@ -88,17 +89,19 @@ class _Process:
 
     def __init__(self):
         folder = Path(tempfile.mkdtemp(prefix="vellus_"))
+        # Blender leaves its folder of temporary files behind if it is killed.
+        temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._errors = folder / "errors"
         inherited = os.environ.get("PYTHONPATH")
         paths = [str(_PACKAGE.parent), *([inherited] if inherited else [])]
         with self._errors.open("wb") as file:
             self._process = subprocess.Popen(
-                [*cli_command.words(), "background"],
+                [*cli_command.words(), "background", str(folder)],
                 stdin=subprocess.PIPE,  # its end tells the other process that this one has ended
                 stdout=subprocess.DEVNULL,
                 stderr=file,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                env={**os.environ, **temporary, "PYTHONPATH": os.pathsep.join(paths)},
             )
         self.end = weakref.finalize(self, _end, self._process)
 

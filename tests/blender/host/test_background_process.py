@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One other process runs all jobs. It ends when it is idle, and with the process that started it."""
 
+import gc
 import os
 import shutil
 import subprocess
@@ -63,6 +64,21 @@ def test_jobs_have_one_process(job):
     assert lost.is_ended() and lost.complaint()
 
 
+def test_temporary_files_are_removed(job, tmp_path, monkeypatch):
+    """Files of the other process in the system's folder of temporary files are gone after its end, also if killed."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    words = [sys.executable, "-c", f"import tempfile; tempfile.mkdtemp()\n{OTHER}"]
+    monkeypatch.setattr(cli_command, "words", lambda: words)
+    one = job("works")
+    one.wait(20.0)
+    (folder,) = tmp_path.glob("vellus_*")
+    assert any(each.is_dir() for each in folder.iterdir())
+    background_process.end()
+    del one
+    gc.collect()
+    assert not folder.exists()
+
+
 def test_a_job_is_given_up_after_its_time(job, monkeypatch):
     monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
     late = job("works")
@@ -71,17 +87,18 @@ def test_a_job_is_given_up_after_its_time(job, monkeypatch):
     assert not late._process.is_running
 
 
-def test_an_idle_process_ends(monkeypatch):
+def test_an_idle_process_ends(tmp_path, monkeypatch):
     """Without jobs the process returns from its work; at the end of its input it exits at once."""
     exited = threading.Event()
     monkeypatch.setattr(os, "_exit", lambda _status: exited.set())
     monkeypatch.setattr(background_process, "IDLE", 0.01)
     read, write = os.pipe()
-    background_jobs.serve(read)
+    background_jobs.serve(read, tmp_path)
     assert not exited.is_set()
     os.close(write)
     assert exited.wait(20.0)
     os.close(read)
+    assert not tmp_path.exists()
 
 
 def test_a_job_that_was_dropped_is_left_out(tmp_path):
@@ -90,7 +107,7 @@ def test_a_job_that_was_dropped_is_left_out(tmp_path):
 
 @pytest.mark.farm
 def test_the_process_ends_with_its_parent(tmp_path):
-    """When the parent is killed, the other process ends and leaves no folder behind."""
+    """When the parent is killed, the other process ends and leaves no folder behind, of jobs or temporary files."""
     folder = tmp_path / "job"
     folder.mkdir()
     told = tmp_path / "told"
@@ -103,7 +120,10 @@ def test_the_process_ends_with_its_parent(tmp_path):
         Path({str(told)!r}).write_text(str(job._process._process.pid))
         time.sleep(60.0)
     """
-    parent = subprocess.Popen([sys.executable, "-c", textwrap.dedent(code)], stdout=subprocess.DEVNULL)
+    words = [sys.executable, "-c", textwrap.dedent(code)]
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    parent = subprocess.Popen(words, stdout=subprocess.DEVNULL, env=os.environ | {"TMPDIR": str(temporary)})
     end = time.monotonic() + 60.0
     while not (told.is_file() and told.read_text()) and time.monotonic() < end:
         time.sleep(0.05)
@@ -114,6 +134,8 @@ def test_the_process_ends_with_its_parent(tmp_path):
     while _runs(other) and time.monotonic() < end:
         time.sleep(0.05)
     assert not _runs(other) and not folder.exists()
+    assert [each.name for each in temporary.iterdir() if not each.name.startswith("blender_")] == []
+    assert len(list(temporary.iterdir())) <= 1  # of the parent, which was killed
 
 
 def _runs(pid):

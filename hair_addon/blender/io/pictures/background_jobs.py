@@ -15,19 +15,20 @@ from ...host import background_process
 from . import light_panorama, surface_bake, world_panorama
 
 
-def serve(stream):
+def serve(stream, temporary):
     """Run the jobs whose folders are lines of JSON of a file descriptor, until there is none for some minutes.
 
-    At the end of the stream the process ends at once, also within a job, and removes the folders of unfinished jobs.
+    At the end of the stream the process ends at once, also within a job, and removes the folders of unfinished jobs and
+    the folder of its temporary files.
     """
     folders = queue.Queue()
-    threading.Thread(target=_read, args=(stream, folders), daemon=True).start()
+    threading.Thread(target=_read, args=(stream, folders, temporary), daemon=True).start()
     with contextlib.suppress(queue.Empty):
         while True:
             _run(Path(folders.get(timeout=background_process.IDLE)))
 
 
-def _read(stream, folders):
+def _read(stream, folders, temporary):
     """Put the folders into a queue. Python's own streams would keep a lock when the process ends."""
     rest, seen = b"", []
     while found := os.read(stream, 1 << 16):
@@ -35,7 +36,7 @@ def _read(stream, folders):
         for line in lines:
             seen.append(json.loads(line))
             folders.put(seen[-1])
-    for folder in seen:
+    for folder in (*seen, temporary):
         shutil.rmtree(folder, ignore_errors=True)
     os._exit(0)
 
