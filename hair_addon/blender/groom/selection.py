@@ -183,6 +183,11 @@ def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
     return next((o for o in _there(view_layer) if o.data == curves), None)
 
 
+def is_in(known: Object, view_layer: ViewLayer) -> bool:
+    """Whether a view layer has an object; names do not tell a library override from the object that it overrides."""
+    return known in _there(view_layer)
+
+
 def make_active(chosen: Object | None, view_layer: ViewLayer) -> None:
     """Select only this object and make it active; without effect if the view layer does not have it."""
     there = _there(view_layer)

@@ -9,6 +9,7 @@ from hair_addon.blender.groom.guides import line_drawing
 from hair_addon.blender.groom.systems import hair_systems
 from hair_addon.blender.ui import panels
 from tests.support.interface.layout import draw
+from tests.support.overridden import override, parts
 from tests.support.reading import points, write_points
 
 TAB = [panel for panel in panels.CLASSES if panel.bl_region_type == "UI"]
@@ -116,6 +117,40 @@ def test_a_tie_is_drawn_off_the_surface_and_gather_uses_it(hair):
     assert not np.array_equal(points(guides), before)
     bpy.data.objects.remove(tie)
     assert line_drawing.tie_of(guides.data) is None
+
+
+def test_lines_are_drawn_on_the_override_of_a_linked_character(hair, tmp_path):
+    """Its collection takes no new objects, and has the same name as the linked surface."""
+    override(hair, tmp_path)
+    bpy.context.view_layer.objects.active = parts()[0]
+    bpy.ops.vellus.add_hair(guide_count=10, strand_count=20)
+    for draw_lines in (bpy.ops.vellus.draw_tie, bpy.ops.vellus.draw_flow, bpy.ops.vellus.draw_parting):
+        draw_lines()
+        lines = bpy.context.object
+        assert lines.mode == "EDIT" and lines.parent == parts()[0]
+        draw_lines()
+
+
+def test_lines_that_cannot_be_seen(hair):
+    """Hidden lines are shown, and lines outside of the view layer refused; a tie has no field, so new lines begin."""
+    guides, scene = bpy.data.objects["Guides"], bpy.context.scene
+    for draw_lines in (bpy.ops.vellus.draw_tie, bpy.ops.vellus.draw_parting):
+        bpy.context.view_layer.objects.active = hair
+        draw_lines()
+        lines = bpy.context.object
+        draw_line(lines, *arc("X"))
+        draw_lines()
+        lines.hide_set(True)
+        draw_lines()
+        assert bpy.context.object == lines and lines.visible_get()
+        draw_lines()
+        lines.use_fake_user = True
+        scene.collection.objects.unlink(lines)
+    with pytest.raises(RuntimeError, match='"Parting of Sphere" is not in this view layer'):
+        bpy.ops.vellus.draw_parting()
+    assert bpy.context.mode == "OBJECT"
+    bpy.ops.vellus.draw_tie()
+    assert bpy.context.object.name == guides.data.vellus.tie_lines == "Tie of Sphere.001"
 
 
 def test_what_is_no_curve_is_not_drawn_on(hair):

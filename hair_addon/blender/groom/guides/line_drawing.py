@@ -5,6 +5,7 @@ import bpy
 from bpy.types import Context, Curves, Object
 
 from ....core.errors import HairError
+from ...data import surface_collections
 from ...data.strands import curves
 from ...host.notices import name_of, text_of
 from .. import selection
@@ -47,7 +48,14 @@ def draw_flow(guides: Curves, context: Context) -> None:
 
 
 def draw_tie(guides: Curves, context: Context) -> None:
-    """Start drawing the curves that gather guides, or continue existing ones. Raises `HairError`."""
+    """Start drawing the curves that gather guides, or continue existing ones. Raises `HairError`.
+
+    No panel shows the name of these curves: if they were converted, or are in other view layers only, new ones begin.
+    """
+    curves.require_editable(guides)
+    tie = tie_of(guides)
+    if tie is None or not selection.is_in(tie, context.view_layer):
+        guides.vellus.tie_lines = ""
     _begin(guides, guides.vellus, "tie_lines", "Tie", context)
     for name, value in _OFF_SURFACE.items():
         setattr(context.tool_settings.curve_paint_settings, name, value)
@@ -77,16 +85,20 @@ def stop(context: Context) -> None:
 def _begin(target, group, field, title, context):
     surface = target.surface
     curves.require_editable(target)
-    if surface is None or context.view_layer.objects.get(surface.name) != surface:
+    if surface is None or not selection.is_in(surface, context.view_layer):
         raise HairError("The surface is missing: pick a mesh.")
     lines = bpy.data.objects.get(text_of(group, field))
     if lines is not None and lines.type != "CURVE":
         sentence = '"{name}" is not a curve that can be drawn on: clear the field to draw new lines.'
         raise HairError(sentence, name=name_of(lines))
+    if lines is not None and not selection.is_in(lines, context.view_layer):
+        raise HairError('"{name}" is not in this view layer: include one of its collections.', name=name_of(lines))
     if lines is None:
         lines = _new_lines(f"{title} of {surface.name}", surface)
     if context.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
+    is_viewport = context.area is not None and context.area.type == "VIEW_3D"
+    selection.reveal(lines, context.view_layer, context.space_data if is_viewport else None)
     selection.make_active(lines, context.view_layer)
     surface.select_set(True)  # the tool draws on selected objects
     bpy.ops.object.mode_set(mode="EDIT")
@@ -94,7 +106,7 @@ def _begin(target, group, field, title, context):
     paint = context.tool_settings.curve_paint_settings
     for name, value in _TOOL.items():
         setattr(paint, name, value)
-    if context.area is not None and context.area.type == "VIEW_3D":
+    if is_viewport:
         bpy.ops.wm.tool_set_by_id(name="builtin.draw", space_type="VIEW_3D")
 
 
@@ -102,7 +114,7 @@ def _new_lines(name, surface):
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"
     lines = bpy.data.objects.new(name, data)
-    (surface.users_collection or [bpy.context.scene.collection])[0].objects.link(lines)
+    surface_collections.collection_of(surface).objects.link(lines)
     lines.parent = surface  # lines use its coordinates and move with it
     lines.show_in_front, lines.hide_render = True, True
     return lines
