@@ -235,6 +235,19 @@ def test_locks_of_presets_for_few_strands_are_explained(hair):
     assert not any(map(style_items.enlarged_of, state().styles))
 
 
+def test_a_style_is_added_to_hair_that_undo_read_again_meanwhile(hair):
+    bpy.ops.ed.undo_push(message="Before")
+    hair.data.vellus.hair.strand_count = 40
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="After")
+    work = hair_styles.adding(bpy.data.hair_curves["Hair"], clump.Settings(), is_fitted=True)
+    next(work)
+    bpy.ops.ed.undo()
+    with pytest.raises(StopIteration):
+        work.send(None)
+    assert [item.kind for item in state().styles] == ["CLUMP"]
+
+
 def test_a_preset_may_come_after_the_present_styles(styled):
     before = styles()
     operate(bpy.ops.vellus.apply_style_preset, preset="WET", keeps_styles=True)

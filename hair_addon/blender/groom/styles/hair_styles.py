@@ -50,10 +50,10 @@ def adding(
         settings = replace(settings, seed=style_items.new_seed(hair.vellus))
     place = Remembered(hair)
     yield _placing_locks(hair, [settings])
-    state = _found(place).vellus
-    style_items.add(state, settings, name)
-    _note_locks(hair, state.styles[-1:], [wanted])
-    return style_items.settings_of(style_items.active_of(state))
+    hair = _found(place)
+    style_items.add(hair.vellus, settings, name)
+    _note_locks(hair, hair.vellus.styles[-1:], [wanted])
+    return style_items.settings_of(style_items.active_of(hair.vellus))
 
 
 def assigning(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> Work[None]:
