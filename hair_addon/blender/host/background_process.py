@@ -57,8 +57,11 @@ class Job:
         if is_running or self._error:
             return not is_running
         if not (self._folder / BEGUN).exists() and self._attempts < _MOST_ATTEMPTS:
-            self._send()  # the process was idle for too long, or another job has ended it
-            return False
+            try:
+                self._send()  # the process was idle for too long, or another job has ended it
+            except OSError as error:
+                self._error = str(error)
+            return bool(self._error)
         return True
 
     def wait(self, seconds):

@@ -64,6 +64,16 @@ def test_jobs_have_one_process(job):
     assert lost.is_ended() and lost.complaint()
 
 
+def test_a_process_that_cannot_start_again_ends_its_jobs(job, tmp_path, monkeypatch):
+    """A job whose process was lost before the job began has ended if no other process can start, and says why."""
+    monkeypatch.setattr(cli_command, "words", lambda: [sys.executable, "-c", "import time; time.sleep(60)"])
+    lost = job("works")
+    lost._process.end()
+    monkeypatch.setattr(cli_command, "words", lambda: [str(tmp_path / "gone")])
+    assert lost.is_ended() and lost.is_ended()
+    assert "gone" in lost.complaint()
+
+
 def test_temporary_files_are_removed(job, tmp_path, monkeypatch):
     """Files of the other process in the system's folder of temporary files are gone after its end, also if killed."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
