@@ -64,7 +64,7 @@ lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor and, with G
 	$(python) -m pyrefly check
 	.venv/bin/zizmor --offline --no-progress --quiet .github/workflows
 	if command -v go >/dev/null; then go run $(actionlint) -shellcheck= -pyflakes= .github/workflows/*.yml; \
-	  else echo "actionlint is left out: there is no Go"; fi
+	  else echo "actionlint is skipped: Go is not installed"; fi
 
 samples: $(installed) ## the .blend files of blend_samples
 	$(python) blend_samples/build_samples.py $(ARGS)

@@ -182,7 +182,7 @@ def test_a_remesh_that_makes_two_walls_of_an_open_surface_is_explained(hair):
     bpy.ops.object.voxel_remesh()
     bpy.context.view_layer.update()
     state = bpy.data.objects["Hair Guides"].data.vellus
-    assert state.status.startswith('"Skin" had holes that its new faces close') and not state.is_on_open
+    assert state.status.startswith('The holes of "Skin" were closed') and not state.is_on_open
     skin.data.remesh_voxel_size = 0.04
     bpy.ops.object.voxel_remesh()
     bpy.context.view_layer.update()

@@ -221,10 +221,10 @@ def test_locks_of_presets_for_few_strands_are_explained(hair):
     enlarged = item.clump.size
     (reported,) = style_notes.notes_of(hair.data, item)
     state().active_style = list(state().styles).index(item)
-    assert reported.startswith("For so few strands") and reported in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
+    assert "because there are few strands" in reported and reported in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
     hair.data.vellus.hair.strand_count = 400
     (reported,) = style_notes.notes_of(hair.data, item)
-    assert reported.startswith("The strands are denser now")
+    assert reported.startswith("Strands are denser now")
     fitted = fitting.lock_size_for(*style_items.enlarged_of(item), 400)
     item.clump.size = 0.9 * enlarged  # an artist's own size
     assert style_notes.notes_of(hair.data, item) == []

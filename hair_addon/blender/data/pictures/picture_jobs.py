@@ -27,11 +27,11 @@ last_cache = Cache()  # session_uid of a world, light or object → path of its 
 # Kinds of jobs → sentences while a picture is made, and if it cannot be made.
 _SENTENCES = {
     "world": (
-        'Cycles is rendering the nodes of the world "{name}". Until then, views show their last picture or a color.',
+        'Cycles is rendering the nodes of the world "{name}". Until then, its last picture or viewport color is shown.',
         'Cycles cannot render the nodes of the world "{name}": {reason}',
     ),
     "light": (
-        'Cycles is rendering the nodes of the light "{name}". Until then, views have their last picture or none.',
+        'Cycles is rendering the nodes of the light "{name}". Until then, its last picture or plain light is used.',
         'Cycles cannot render the nodes of the light "{name}": {reason}',
     ),
     "surfaces": (

@@ -109,9 +109,9 @@ def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     fitting_now = fitting.lock_size_for(*known, hair.vellus.hair.strand_count)
     sizes = dict(zip(("wanted", "size", "fitting"), map(_shown, (*known[:2], fitting_now)), strict=True))
     if fitting_now > _NEARLY * known[1]:
-        yield interface_text("For so few strands, locks have a size of {size} instead of {wanted}.", **sizes)
+        yield interface_text("Locks have a size of {size} instead of {wanted}, because there are few strands.", **sizes)
     else:
-        yield interface_text("The strands are denser now: a size of {fitting} fits them.", **sizes)
+        yield interface_text("Strands are denser now: locks with a size of {fitting} fit them.", **sizes)
 
 
 def _shown(length):

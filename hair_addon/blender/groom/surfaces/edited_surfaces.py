@@ -22,7 +22,7 @@ _ROOTED_AGAIN = {
 }
 
 # Voxel Remesh makes two walls of a surface with holes: hair would grow on the inner wall too.
-_CLOSED = '"{name}" had holes that its new faces close, as Voxel Remesh does: undo, fill the holes, and remesh again.'
+_CLOSED = 'The holes of "{name}" were closed by an inner wall, as by Voxel Remesh: undo, fill them, and remesh again.'
 
 
 class Followed(enum.Enum):

@@ -124,7 +124,7 @@ class VELLUS_OT_toggle_composite(HairOperator, bpy.types.Operator):
 
 
 class VELLUS_OT_retry_baking(HairOperator, bpy.types.Operator):
-    """Let Cycles render and bake again what it could not for an error"""
+    """Repeat the renders and bakes of Cycles that failed"""
 
     bl_idname = "vellus.retry_baking"
     bl_label = "Try Again"
@@ -132,7 +132,7 @@ class VELLUS_OT_retry_baking(HairOperator, bpy.types.Operator):
 
     @classmethod
     def applies(cls, _context):
-        cls.poll_message_set("There are no pictures that Cycles could not make.")
+        cls.poll_message_set("No render or bake of Cycles has failed.")
         return picture_jobs.has_failed()
 
     def change(self, _context):

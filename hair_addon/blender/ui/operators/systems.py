@@ -276,7 +276,7 @@ class VELLUS_OT_draw_flow(_DrawLines, bpy.types.Operator):
 
 
 class VELLUS_OT_draw_tie(_DrawLines, bpy.types.Operator):
-    """Draw the curves that Gather leads guides along, from each tie on, with Blender's Draw tool; or stop drawing"""
+    """Draw curves that Gather leads guides along, starting at the tie, with Blender's Draw tool; or stop drawing"""
 
     bl_idname = "vellus.draw_tie"
     bl_label = "Draw Tie"

@@ -60,7 +60,9 @@ def _draw_lines(layout, context, drawn):
     message = "Draw lines on the surface. They take effect immediately."
     if line_drawing.tie_of(drawn) == context.object:
         name = "vellus.draw_tie"
-        message = "Begin each line at its tie. For cornrows, disable the option below. Stop drawing, and use Gather."
+        message = (
+            "Begin each line at its tie. For cornrows, disable the option below. Stop drawing before you use Gather."
+        )
     write(layout, context, interface_text(message), "INFO")
     if name == "vellus.draw_tie":
         layout.prop(context.tool_settings.curve_paint_settings, "use_stroke_endpoints")

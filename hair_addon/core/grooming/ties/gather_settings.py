@@ -27,7 +27,7 @@ class GatherSettings(ToolSettings):
             ("BRAID", "Braid", "Three locks that cross in turn, along the curve"),
             ("ROPE", "Rope", "Two locks twisted around each other, along the curve"),
             ("CORNROWS", "Cornrows", "Braids on the surface: each curve is a row, which hair joins from both sides"),
-            ("BUN", "Bun", "A coil on the surface around the tie, with its ends tucked in"),
+            ("BUN", "Bun", "Coiled on the surface around the tie, with the ends tucked in"),
         ),
     )
     tightness: float = param(
@@ -38,10 +38,10 @@ class GatherSettings(ToolSettings):
         subtype="FACTOR",
     )
     tie_radius: float = _length(0.008, "Radius of the hair at the tie")
-    tail_radius: float = _length(0.018, "Radius of the tail or of the braid")
+    tail_radius: float = _length(0.018, "Radius of the tail or braid")
     bun_radius: float = _length(0.035, "Radius of the bun")
     turns: float = param(
-        2.0, "Turns of the coil of a bun; more turns make a thinner coil", above=0.0, high=100.0, soft_high=10.0
+        2.0, "Turns of the coil of a bun; more turns make the coil thinner", above=0.0, high=100.0, soft_high=10.0
     )
     pitch: float = _length(0.05, "Length of the braid or rope in which each lock returns to its place")
     clearance: float = param(
