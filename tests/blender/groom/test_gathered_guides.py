@@ -253,6 +253,19 @@ def test_added_and_mirrored_guides_are_in_groups(guides):
     assert (groups_of(guides) == 1).all()
 
 
+def test_guides_that_are_added_to_layers_are_in_the_bun(guides):
+    """Means of turns by whole circles would leave it."""
+    api.add_layer(guides)
+    add_line()
+    gather(guides, shape="BUN")
+    before = points(guides)
+    api.change_guides(guides, "COUNT", factor=3.0)
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(guides)[: len(before)], before)
+    ends = points(guides)[len(before) :, -12:] - np.array(LINE[0])
+    assert np.median(np.linalg.norm(ends, axis=2).max(axis=1)) < 1.5 * SIZES["bun_radius"]
+
+
 def test_layers_carry_groups_to_guides_that_are_grown_again(guides):
     api.add_layer(guides)
     add_line(lines=SIDES)
