@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs of another Blender, for views and renders.
+"""The command that runs jobs in the background for viewports and renders.
 
 blender/host/background_process.py runs this command in another process. It is for internal use and is not listed.
 """

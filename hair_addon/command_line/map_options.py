@@ -100,7 +100,7 @@ def mapped(given, settings):
 
 
 def without_effect(given, hair):
-    """Return the settings of styles with a map or a curve that hair Curves do not have."""
+    """Return the settings with a map or a curve whose styles hair Curves do not have."""
     items = blender.settings.style_items
     styles = dict(zip(items.names_of(hair.vellus), items.styles_of(hair.vellus), strict=True))
     found = []

@@ -47,7 +47,7 @@ float between_ends(float value, float texel_count)
   return (clamp(value, 0.0, 1.0) * (texel_count - 1.0) + 0.5) / texel_count;
 }
 
-// The coordinate in a table of as many parts as layers, for a value in [0, 1] along each part.
+// The coordinate in a table with one part for each layer, for a value in [0, 1] along the part of a layer.
 float within_layer(float value, float texel_count, float layer)
 {
   return (between_ends(value, texel_count / layer_count()) + layer) / layer_count();

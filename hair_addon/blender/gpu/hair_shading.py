@@ -149,8 +149,8 @@ def marschner_strand_shading(tables):
 
 
 def kajiya_kay_look_shading(settings, variation, sigma_a, is_radial=False):
-    """Return the `Shading` of strands with looks of their own; sigma_a (..., 3): of some of them, which give their
-    colors with the radial roughness of the settings; is_radial: whether strands differ in it.
+    """Return the `Shading` of strands with looks of their own; sigma_a (..., 3): absorption of some strands, which
+    gives their colors with the radial roughness of the settings; is_radial: whether strands differ in radial roughness.
     """
     forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, sigma_a)
     blocks = {"settings": settings, "variation": variation}
@@ -159,8 +159,8 @@ def kajiya_kay_look_shading(settings, variation, sigma_a, is_radial=False):
 
 
 def marschner_look_shading(tables):
-    """Return a function of sigma_a (S, ..., 3), and of the radial roughness (S,) if it varies, of some strands that
-    returns the `Shading` of strands with looks of their own.
+    """Return a function that returns the `Shading` of strands with looks of their own. Its arguments are sigma_a (S,
+    ..., 3) and, if it varies, the radial roughness (S,) of some strands.
 
     tables: `look_tables.LookTables` or `radial_tables.RadialTables`; the given strands define the light that strands
     pass on to others.

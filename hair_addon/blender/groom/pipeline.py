@@ -353,7 +353,7 @@ def restyle(
     """Apply the present styles and map of the thickness to bound hair; returns whether nothing else had changed.
 
     is_drawn: whether the GPU generates the shown strands. Nothing is searched, and nothing is computed if styles are
-    unchanged: on a surface that was scaled since, hair keeps the scale that it was bound at until a style changes.
+    unchanged: on a surface that was scaled after binding, hair keeps the scale of its binding until a style changes.
     Raises `HairError`.
     """
     bound = bindings.of(target)

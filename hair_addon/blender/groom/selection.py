@@ -184,7 +184,7 @@ def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
 
 
 def is_in(known: Object, view_layer: ViewLayer) -> bool:
-    """Whether a view layer has an object; names do not tell a library override from the object that it overrides."""
+    """Whether a view layer has an object; a library override and its linked object have the same name."""
     return known in _there(view_layer)
 
 

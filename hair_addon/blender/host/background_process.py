@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Another Blender without a window, which runs jobs of this Blender one after the other while this one goes on.
+"""A second Blender without a window, which runs jobs of this Blender in the background, one after another.
 
-The first job starts it. It ends when it has had no job for some minutes, and with this process, also if that is killed.
-A job is a folder with its values. The other process reads the path of the folder, and writes files into it. Temporary
-files of the other process are in a folder that is removed after its end.
+The first job starts it. It ends after some minutes without jobs, and when this process ends or is killed. A job is a
+folder with its values. The other process reads the path of the folder and writes files into it. Its temporary files are
+in a folder that is removed when it has ended.
 """
 
 import contextlib
@@ -18,11 +18,11 @@ from pathlib import Path
 
 from . import cli_command
 
-VALUES, BEGUN, ENDED = "job.json", "begun", "ended.txt"  # files in the folder of a job; the last contains an error
-IDLE = 300.0  # [s] until the process ends without jobs
+VALUES, BEGUN, ENDED = "job.json", "begun", "ended.txt"  # files of a job; the last contains its error, if any
+IDLE = 300.0  # [s] without jobs after which the process ends
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_MOST_ATTEMPTS = 2  # of a job that has not begun
+_MOST_ATTEMPTS = 2  # to start a job
 _FIRST_LOOK, _LONGEST_LOOK = 0.002, 0.05  # [s] between checks while waiting
 
 _running = None  # the `_Process` of this Blender
@@ -31,7 +31,7 @@ _running = None  # the `_Process` of this Blender
 class Job:
     """A job in a folder. Raises `OSError` if the other process cannot start.
 
-    values: numbers, texts and lists, with the "kind" of job, for `background_jobs`.
+    values: numbers, strings and lists for `background_jobs`, with the "kind" of the job.
     """
 
     def __init__(self, folder, values):
@@ -49,9 +49,9 @@ class Job:
 
     def is_ended(self):
         """Whether the job has ended, or its process."""
-        # A process that ends writes nothing after this test.
+        # Tested first: a process that has ended writes no more files.
         is_running = self._process.is_running
-        self._has_ended = self._has_ended or (self._folder / ENDED).is_file()  # its folder may be removed then
+        self._has_ended = self._has_ended or (self._folder / ENDED).is_file()  # kept, because its folder may be removed
         if self._has_ended:
             return True
         if is_running or self._error:
@@ -75,12 +75,12 @@ class Job:
             pause = min(2.0 * pause, _LONGEST_LOOK)
 
     def drop(self):
-        """Give up the job. A process that has begun it is killed, so that it is free for others."""
+        """Give up the job. If it is running, its process is killed, so that other jobs can run."""
         if (self._folder / BEGUN).exists() and not (self._folder / ENDED).exists():
             self._process.end()
 
     def complaint(self):
-        """Return why the ended job has failed; empty if it has not."""
+        """Return why the ended job failed, or an empty string."""
         try:
             return (self._folder / ENDED).read_text("utf-8")
         except OSError:
@@ -101,7 +101,7 @@ class _Process:
         with self._errors.open("wb") as file:
             self._process = subprocess.Popen(
                 [*cli_command.words(), "background", str(folder)],
-                stdin=subprocess.PIPE,  # its end tells the other process that this one has ended
+                stdin=subprocess.PIPE,  # closed when this process ends, which ends the other
                 stdout=subprocess.DEVNULL,
                 stderr=file,
                 env={**os.environ, **temporary, "PYTHONPATH": os.pathsep.join(paths)},
@@ -119,7 +119,7 @@ class _Process:
         self._process.stdin.flush()
 
     def complaint(self):
-        """Return the last line that the process wrote as an error, or how it ended."""
+        """Return the last line of the process's error output, or a sentence with its exit status."""
         lines = self._errors.read_text("utf-8", "replace").split("\n")
         found = next((line.strip() for line in reversed(lines) if line.strip()), "")
         return found or f"Blender's background process ended with status {self._process.poll()}."

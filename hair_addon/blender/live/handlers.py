@@ -390,8 +390,8 @@ def after_import(context=None, *_args):
 
 @persistent
 def after_load(*_args):
-    """Take the hair of a file as up to date, and show its baked frames if Blender has no window: it reports no
-    update of the file.
+    """Take the hair of a file as up to date. Without a window Blender reports no update of the file, so baked frames
+    are shown here.
     """
     global _is_opening, _is_undone
     _is_opening = not bpy.app.background

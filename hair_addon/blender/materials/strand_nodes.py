@@ -97,7 +97,7 @@ _SCALED = "Scaled Roughness of "  # nodes that multiply the roughness of a hair 
 def write(tree, hair_node, variation, falloff, is_mapped=False, is_radial=False):
     """Vary the absorption of a Principled Hair node; returns the output of a color with this falloff, for EEVEE.
 
-    is_mapped: by the looks that the hair's Curves store; is_radial: these looks differ in radial roughness.
+    is_mapped: by the looks that the hair's Curves store; is_radial: whether these looks differ in radial roughness.
     """
     nodes = _ours(tree)
     graph = _graph_of(is_mapped, is_radial)

@@ -18,7 +18,7 @@ class VellusStrokePoint(bpy.types.PropertyGroup):
 def annotations(fitted_radius):
     """Return {name: bpy property} of an operator with a stroke of a brush on a surface.
 
-    fitted_radius: a function that returns the radius [m] until it is set, or None.
+    fitted_radius: a function that returns the radius [m] that is used until a radius is set, or None.
     """
 
     def radius_of(_operator, value, is_set):

@@ -53,7 +53,8 @@ class VellusStyle(bpy.types.PropertyGroup):
         "kind": bpy.props.EnumProperty(
             items=[(kind, LABELS[kind], DESCRIPTIONS[kind]) for kind in KINDS], options={"HIDDEN"}
         ),
-        # Of a preset whose locks were enlarged, as there were few strands; zero without.
+        # The wanted and the enlarged size of a preset's locks [m], and the strand count that enlarged them; zero
+        # otherwise.
         "lock_wanted": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),
         "lock_enlarged": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),
         "lock_strands": bpy.props.IntProperty(min=0, options={"HIDDEN"}),
@@ -75,7 +76,7 @@ def settings_of(item):
 
 
 def note_enlarged(item, wanted, enlarged, strand_count):
-    """Note that locks of a wanted size [m] were enlarged for a number of strands."""
+    """Note that locks of a wanted size [m] were enlarged because of a number of strands."""
     is_enlarged = enlarged > wanted
     item.lock_wanted, item.lock_enlarged = (wanted, enlarged) if is_enlarged else (0.0, 0.0)
     item.lock_strands = strand_count if is_enlarged else 0

@@ -12,7 +12,7 @@ _COLOR = (1.0, 1.0, 1.0, 0.8)
 _WIDTH = 1.5  # [pixels]
 
 
-# Where the circle stays while moving the mouse changes the brush, in the window [pixels]; None for at the mouse.
+# Place of the circle in the window [pixels] while mouse movement changes the brush; None: at the mouse.
 _held = None
 
 

@@ -22,7 +22,7 @@ _SLENDER = 1.5  # least length of hair relative to its diameter
 class Sections:
     """K sections: centers, normals and binormals (K, 3); radii (K, n) in n directions around; vertices (K, n) there.
 
-    sizes: (K,) mean radius of the corners, which is the radius of a round strand that a tube was made of.
+    sizes: (K,) mean radii of the corners. For a tube that was made from a round strand, this is the strand's radius.
     """
 
     centers: np.ndarray

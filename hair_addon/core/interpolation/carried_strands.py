@@ -5,7 +5,7 @@ A strand's point x beside the point c(s) of its course keeps its offset in a fra
 
     x' = x + (c'(s) - c(s)) + (Q(s) - 1) (x - c(s) - d)
 
-d is the offset of the strand's first point, which does not turn: a root stays beside its course's root. Where the
+d is the offset of the strand's first point. It does not turn, so a root stays beside the root of its course. Where the
 course does not move, both terms are zero and no bit changes. Q rotates the former tangents of the course to the present
 tangents. At the root, Q is a rotation about the surface's normal, in proportion to how closely the course lies along
 the surface, followed by the least rotation. Q continues along the course by least rotations [Bishop75], so that strands

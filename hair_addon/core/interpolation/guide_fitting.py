@@ -6,8 +6,8 @@ without preserved lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own
 the normal (interpolation.py). For complex numbers x + iy that rotation is a factor e^(i phi), so x + iy and z are
 sparse linear least squares with one matrix each for all points, solved by the normal equations. Each guide is damped
 toward its present shape with its own weight, so that the steps can be repeated although interpolation is not linear,
-and guides with few strands are stable. Strands have the frames of short hair here: with the limited turns of long
-strands (interpolation.py), errors of hair three times as long as its sphere's radius would be 1 % smaller.
+and guides with few strands are stable. Strands have the frames of short hair here: the limited turns of long strands
+(interpolation.py) would make errors of hair that is three times as long as the radius of its sphere only 1 % smaller.
 """
 
 import numpy as np

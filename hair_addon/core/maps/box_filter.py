@@ -34,7 +34,7 @@ class _Taps:
 
     @cached_property
     def limits(self) -> np.ndarray:
-        """The least and the greatest index of texels."""
+        """The smallest and the largest texel index."""
         return np.array([self.texels.min(initial=0), self.texels.max(initial=0)])
 
 
@@ -75,7 +75,7 @@ class Levels:
         self._shapes = [level.shape for level in levels]
 
     def follow(self, pixels: np.ndarray, changed: tuple[slice, slice] | None) -> None:
-        """Show other pixels of the same shape: only changed rows are halved again; changed: as of `changed_box`."""
+        """Replace the image by one of the same shape, and halve only changed rows; changed: from `changed_box`."""
         self.pixels = pixels
         if changed is None:
             return

@@ -19,7 +19,7 @@ MODES = ("rgb", "hsv", "hsl")
 HUES = ("near", "far", "cw", "ccw")
 
 MOST_STOPS = 32  # of Blender's color ramps
-_MOST_POINTS = 1024  # of curves: beyond the samples that are read
+_MOST_POINTS = 1024  # of curves: more than the samples that are read
 
 
 @dataclass(frozen=True)

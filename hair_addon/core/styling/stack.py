@@ -109,7 +109,7 @@ class Styling:
 
     @cached_property
     def used_centres(self) -> list[np.ndarray] | None:
-        """`centres_of` all strands, where sizes of locks differ between strands: most centers have none there.
+        """`centres_of` all strands if sizes of locks differ between strands: most centers then have no strands.
 
         None if all centers are to be styled.
         """

@@ -22,8 +22,8 @@ pixel_cache = Cache(capacity=16)
 class _Converted:
     """Pixels of an image (H, W, C) in Blender, and the converted pixels; way: arguments of the conversion.
 
-    spare: an array of the same size to read the image into; before, changed: the pixels that a change replaced, and the
-    box in which they differ.
+    spare: an array of the same shape for the next read; before: the converted pixels before the last change; changed:
+    the box of that change.
     """
 
     raw: np.ndarray
@@ -70,7 +70,7 @@ def _may_be_painted(image):
 
 
 def changed_since(before, now):
-    """Return the box in which converted pixels of a painted image differ from those before; None if they are equal."""
+    """Return the box in which two versions of an image's converted pixels differ; None if they are equal."""
     if before is now:
         return None
     known = (each for each in converted_cache.values() if each.before is before and each.pixels is now)
@@ -78,7 +78,7 @@ def changed_since(before, now):
 
 
 def _raw(image, into=None):
-    """Return the pixels (H, W, C) in Blender; into: an array to fill, if it has their shape."""
+    """Return the pixels (H, W, C) in Blender; into: an array to fill, if its shape fits."""
     width, height = image.size
     shape = height, width, image.channels
     values = into if into is not None and into.shape == shape else np.empty(shape, np.float32)

@@ -138,7 +138,7 @@ class Source:
         return known.texels.sample({tile: self._levels(tile, values) for tile, values in self.pixels.items()})
 
     def _levels(self, tile, values):
-        """Return the `Levels` of an image, which follow the changes of a painted one."""
+        """Return the `Levels` of an image; those of an image without tiles are kept, and updated when it changes."""
         if tile is not None:
             return maps.box_filter.Levels(values)
         key = self.settings.source, self.is_color

@@ -22,9 +22,9 @@ _PATIENCE = 600.0  # [s] for a job
 _LOOK = 0.05  # [s] between checks of jobs
 
 job_cache = Cache()  # path of a file → `PictureJob`: running, or failed
-last_cache = Cache()  # session_uid of a world, light or object → path of its last picture, with any nodes
+last_cache = Cache()  # session_uid of a world, light or object → path of its last picture, also of former nodes
 
-# Kinds of jobs → sentences while a picture is made, and if it cannot be made.
+# Kind of job → (sentence while a picture is made, sentence if it cannot be made).
 _SENTENCES = {
     "world": (
         'Cycles is rendering the nodes of the world "{name}". Until then, its last picture or viewport color is shown.',
@@ -44,7 +44,7 @@ _SENTENCES = {
 class PictureJob:
     """Files of pictures that the background process makes.
 
-    owners: {path of a file: original world, light or object that it shows}; values: of its kind of job.
+    owners: {path of a file: original world, light or object that it shows}; values: arguments of this kind of job.
     reasons: {path: why the file cannot be made}.
     """
 
@@ -53,11 +53,11 @@ class PictureJob:
         self._lock = threading.Lock()
         sources = [(library_of(one), one.name) for one in owners.values()]
         try:
-            # Beside the files, as a file cannot be renamed to another file system.
+            # Beside the files, because a file cannot be renamed to another file system.
             parent = next(iter(owners)).parent
             folder = Path(tempfile.mkdtemp(prefix=".", dir=parent))
             self._remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-            local = {one for one in owners.values() if one.library is None}  # a .blend has only links to the others
+            local = {one for one in owners.values() if one.library is None}  # the others are read from their libraries
             blend = folder / BLEND
             bpy.data.libraries.write(str(blend), local, path_remap="ABSOLUTE", fake_user=True)
             unsaved_images.write(folder, [tree for one in local for tree in _trees_of(one)])
@@ -80,7 +80,7 @@ class PictureJob:
         return self._job is not None
 
     def is_ended(self, waits):
-        """Whether it has ended; waits: wait for its end. Then each file is in its place, or there is a reason."""
+        """Whether the job has ended, after waiting if `waits`; each file is then in its place, or there is a reason."""
         job = self._job
         if job is not None and waits:
             job.wait(_PATIENCE)
@@ -91,7 +91,7 @@ class PictureJob:
         return self._job is None
 
     def _place(self, complaint):
-        """Move the files of the ended job into their places; complaint: why it has failed, empty if it has not."""
+        """Move the files of the ended job into their places; complaint: why it failed, or empty."""
         for index, path in enumerate(self._names):
             made = self._folder / f"{index}{path.suffix}"
             try:
@@ -119,11 +119,11 @@ class PictureJob:
 
 
 def files_of(kind, owners, waits, **values):
-    """Return ({path: file with its picture}, [`HairError` of a file that cannot be made]) of {path: original}.
+    """Return ({path: file with its picture}, [`HairError` of each file that cannot be made]) for {path: original}.
 
-    Missing files are made. waits: return only once all others are there. Views do not wait. They have coarse pictures
-    until the fine ones are made, and one job of a kind at a time, as nodes that are dragged or played change in each
-    frame.
+    Missing files are made. waits: return when they are made or have failed. Viewports do not wait: they have coarse
+    pictures until the fine ones are made, and at most one job of each kind at a time, because dragged or animated nodes
+    change in each frame.
     """
     missing = {path: one for path, one in owners.items() if not path.is_file()}
     errors = []
@@ -145,7 +145,7 @@ def files_of(kind, owners, waits, **values):
 def _make(kind, owners, waits, used, values):
     """Make the missing files of {path: original}; return a `HairError` of each that cannot be made.
 
-    used: paths of files that are in use, and stay.
+    used: paths of files that are in use and are not removed.
     """
     missing = {path: one for path, one in owners.items() if not path.is_file()}
     new = {path: one for path, one in missing.items() if not _is_known(path)}
@@ -165,7 +165,7 @@ def _make(kind, owners, waits, used, values):
 
 
 def _coarse(path):
-    """Return the file of the coarse picture for that of a picture."""
+    """Return the path of the coarse version of a picture."""
     return path.with_suffix(f".coarse{path.suffix}")
 
 
@@ -176,15 +176,15 @@ def library_of(original):
 
 
 def last_of(owner):
-    """Return the last picture of a world or light, with other nodes, for views while its next one is made; None
-    without one.
+    """Return the last picture of a world or light, also of its former nodes, for viewports until its next one is made;
+    None without one.
     """
     path = last_cache.get(owner.original.session_uid)
     return path if path is not None and path.is_file() else None
 
 
 def running():
-    """Return the jobs that run."""
+    """Return the running jobs."""
     return list({job: None for job in job_cache.values() if job.is_running})
 
 
@@ -200,7 +200,7 @@ def has_failed():
 
 
 def try_again():
-    """Forget the jobs that have failed, so that views start them again."""
+    """Forget failed jobs, so that viewports start them again."""
     for path in [path for job in job_cache.values() if not job.is_running for path in job.paths]:
         job_cache.invalidate(path)
     _show()

@@ -41,7 +41,7 @@ class Bake:
     weight: np.ndarray
 
     def fits(self, corner_count, name):
-        """Whether a mesh has the corners of the pictures; prints a message with a name if not."""
+        """Whether the pictures fit a mesh's number of corners; if not, prints a message, unless the name is empty."""
         if len(self.uvs) != corner_count and name:
             say(
                 f'The baked materials of "{name}" do not fit its mesh: apply modifiers that change its faces over time.'
@@ -84,8 +84,8 @@ def find(objects, override, frame, for_render, waits):
     objects: read in turn, as Blender frees the objects of some instances when the next instance is read.
 
     override: the view layer's material; frame: the time of drivers of nodes; waits: return only when all are baked.
-    Without `waits`, the most recent pictures of an object, if there are any, are used until new coarse pictures are
-    baked, and the coarse ones until the fine pictures are. They are used in Edit Mode too, without bakes.
+    Without `waits`, an object keeps its last pictures until new coarse ones are baked, and these until the fine ones
+    are baked. In Edit Mode it keeps its last pictures, and nothing is baked.
     """
     paths, originals, edited = {}, {}, set()
     for one in objects:

@@ -202,7 +202,7 @@ def reads_image(shader_input):
 
 
 def _is_readable(image, material):
-    """Whether an image has pixels of a single picture; if not, print a message. Images of UDIM tiles are baked."""
+    """Whether an image has pixels of a single picture; if not, print a message; UDIM tiles are baked instead."""
     if image.source == "TILED":
         return False
     if image.source not in {"FILE", "GENERATED"}:

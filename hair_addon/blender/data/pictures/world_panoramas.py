@@ -19,7 +19,7 @@ def file_of(world, frame, waits):
 def kept_or_rendered(kind, owner, path, waits, **values):
     """Return the path of the panorama of a world or light, whose name is a digest; None while it is rendered.
 
-    kind, values: of the job that renders; waits: as of `file_of`. Raises `HairError` if it cannot be rendered.
+    kind, values: of the job that renders it; waits: as for `file_of`. Raises `HairError` if it cannot be rendered.
     """
     files, errors = picture_jobs.files_of(kind, {path: owner.original}, waits, **values)
     if errors and not files:

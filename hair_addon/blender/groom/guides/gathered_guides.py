@@ -55,7 +55,7 @@ def _part_hair(datablock):
 
 
 def continued(lines: list[np.ndarray], distance: float) -> list[np.ndarray]:
-    """Return lines (K, 3) [m] of which those that begin at most `distance` [m] from the end of another continue it."""
+    """Return lines (K, 3) [m], joined where a line begins at most `distance` [m] from the end of another."""
     lines = list(lines)
     place = 0
     while place < len(lines):

@@ -208,10 +208,10 @@ def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
 
 
 def write_some(guides: CombedGuides, shapes: Sequence[tuple[np.ndarray, np.ndarray]]) -> int:
-    """Write the shapes of some guides, and the others as they were read; returns the number changed.
+    """Write shapes of some guides, and all other guides as they were read; returns the number changed.
 
-    shapes: pairs of the indices (M, P) of points, and points (M, P, 3) float32 [m]. As strokes call this at each event,
-    other guides are not compared. Raises `HairError`.
+    shapes: pairs of point indices (M, P) and points (M, P, 3) float32 [m]. Other guides are not compared, because
+    strokes call this at each event. Raises `HairError`.
     """
     if frozen_points.read(guides.datablock) is not None:
         after = guides.points.copy()

@@ -23,7 +23,7 @@ _TOOL = {
 }
 
 
-# A tie begins on the surface and leaves it: its line is at the depth of its start.
+# The line of a tie begins on the surface and leaves it at the depth of its start.
 _OFF_SURFACE = {"use_stroke_endpoints": True, "surface_plane": "NORMAL_VIEW"}
 
 
@@ -50,7 +50,7 @@ def draw_flow(guides: Curves, context: Context) -> None:
 def draw_tie(guides: Curves, context: Context) -> None:
     """Start drawing the curves that gather guides, or continue existing ones. Raises `HairError`.
 
-    No panel shows the name of these curves: if they were converted, or are in other view layers only, new ones begin.
+    No panel shows the name of these curves, so new ones are begun if they were converted or are not in this view layer.
     """
     curves.require_editable(guides)
     tie = tie_of(guides)

@@ -102,7 +102,7 @@ def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
 
 
 def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:
-    """Yield a note on locks of a preset that were enlarged, as there were few strands."""
+    """Yield a note on locks of a preset that were enlarged because there were few strands."""
     known = style_items.enlarged_of(item)
     if known is None:
         return

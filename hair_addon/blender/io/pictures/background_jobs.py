@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Jobs of `host.background_process` in its other process: pictures of worlds, lights and surfaces by Cycles."""
+"""The jobs that `host.background_process` sends: pictures of worlds, lights and surfaces by Cycles."""
 
 import contextlib
 import json
@@ -16,10 +16,10 @@ from . import light_panorama, surface_bake, world_panorama
 
 
 def serve(stream, temporary):
-    """Run the jobs whose folders are lines of JSON of a file descriptor, until there is none for some minutes.
+    """Run jobs until none has arrived for some minutes.
 
-    At the end of the stream the process ends at once, also within a job, and removes the folders of unfinished jobs and
-    the folder of its temporary files.
+    stream: a file descriptor with the path of a job's folder in each line, as JSON; temporary: the folder of temporary
+    files. At the end of the stream the process ends at once, even during a job, and removes these folders.
     """
     folders = queue.Queue()
     threading.Thread(target=_read, args=(stream, folders, temporary), daemon=True).start()
@@ -29,7 +29,7 @@ def serve(stream, temporary):
 
 
 def _read(stream, folders, temporary):
-    """Put the folders into a queue. Python's own streams would keep a lock when the process ends."""
+    """Read the folders into a queue. Python's own streams would hold a lock when the process ends."""
     rest, seen = b"", []
     while found := os.read(stream, 1 << 16):
         *lines, rest = (rest + found).split(b"\n")

@@ -14,7 +14,7 @@ from ...host import scene_time
 from . import world_panorama
 
 SIZE = 256, 128  # pixels
-COARSE_SIZE = 64, 32  # of the first picture of views
+COARSE_SIZE = 64, 32  # pixels of the first picture in viewports
 SAMPLES = 8  # per pixel
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
 _ENERGY = 1e6  # of the light, for pixels of about one
@@ -27,8 +27,8 @@ def render(path, name, matrix, frame, is_coarse, out):
     """Render a light of a .blend, turned and placed by a matrix (4, 4), at a frame into an .npz. Raises `HairError`.
 
     `lit` (H, W, 3) and `plain` (H, W): radiance of a white sphere around the light with its nodes and without them, in
-    directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse:
-    render a small picture, which is soon ready.
+    directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse: render
+    a small picture in less time.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

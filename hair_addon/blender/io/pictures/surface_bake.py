@@ -16,7 +16,7 @@ from ...host import scene_time
 
 SIDE = 1024  # texels along a side of a picture; more for meshes with many faces
 IMAGE_SIDE = 2048  # the same for materials with images
-COARSE_SIDE = 256  # the same for the first pictures of views
+COARSE_SIDE = 256  # the same for the first pictures in viewports
 _MARGIN = 2  # texels
 _ATLAS = "vellus_atlas"
 _LARGEST = 6e4  # of half floats
@@ -43,10 +43,10 @@ def bake(path, sources, frame, for_render, is_coarse, out):
     cannot be baked. Raises `HairError` if files cannot be read.
 
     sources: (path of the library of a linked object, or "" for the .blend at `path`; name of the object) of each mesh;
-    is_coarse: bake small pictures, which are soon ready.
-    Modifiers that only deform are turned off, so that patterns stay in place on posed surfaces. Each file has `uvs`
-    (C, 2) of the mesh's corners; float16 `color` (H, W, 3), `roughness`, `metallic` and `weight` (H, W), which is the
-    opaque part; `normal` (H, W, 3) in tangent space, encoded from 0 to 1, empty without nodes of normals.
+    is_coarse: bake small pictures in less time. Modifiers that only deform are turned off, so that patterns stay in
+    place on posed surfaces. Each file has `uvs` (C, 2) of the mesh's corners; float16 `color` (H, W, 3), `roughness`,
+    `metallic` and `weight` (H, W), which is the opaque part; `normal` (H, W, 3) in tangent space, encoded from 0 to 1,
+    empty without nodes of normals.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)

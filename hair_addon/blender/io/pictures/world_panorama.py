@@ -14,7 +14,7 @@ from ...data.pictures import shader_sockets, unsaved_images
 from ...host import scene_time
 
 SIZE = 1024, 512  # pixels of a third of a degree: the sun's disk is half a degree wide
-COARSE_SIZE = 256, 128  # of the first picture of views
+COARSE_SIZE = 256, 128  # pixels of the first picture in viewports
 SAMPLES = 4  # per pixel
 SUN_SAMPLES = 256  # per pixel around the sun of a Sky Texture, whose disk covers two pixels
 _AROUND_SUN = 3  # pixels
@@ -27,7 +27,7 @@ def render(path, name, frame, is_coarse, out):
     """Render a world of a .blend at a frame into an .exr. Raises `HairError`.
 
     The picture is the radiance from all directions, in the projection of the Environment Texture node. is_coarse:
-    render a small picture, which is soon ready.
+    render a picture of fewer pixels or samples in less time.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -40,7 +40,7 @@ def render(path, name, frame, is_coarse, out):
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
     replace_light_paths(scene.world.node_tree, set())
-    scene.world.cycles.sampling_method = "NONE"  # no map of bright directions, which takes most of the time
+    scene.world.cycles.sampling_method = "NONE"  # the importance map would take most of the time
     add_camera(scene)
     sun = _size_of_sun(scene.world.node_tree)
     # Few samples of large pixels would miss the sun.
@@ -56,14 +56,14 @@ def render(path, name, frame, is_coarse, out):
 
 
 def picture(scene, path):
-    """Render (H, W, 3) float32, the lowest row first, through a file."""
+    """Render a picture (H, W, 3) float32, bottom row first; path: of the file that is written and read."""
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     return light_images.read_layers(path)[""]
 
 
 def _render_sun(scene, colors, sun, part):
-    """Render the pixels around the brightest pixel of a picture again, with many samples; sun: its diameter [rad]."""
+    """Render the pixels around the brightest one of a picture again with many samples; sun: its diameter [rad]."""
     height, width = colors.shape[:2]
     row, column = np.unravel_index(colors.sum(axis=-1).argmax(), (height, width))
     reach = math.ceil(0.5 * sun * height / math.pi) + _AROUND_SUN
@@ -91,7 +91,7 @@ def add_camera(scene):
 
 
 def _size_of_sun(tree):
-    """Return the largest diameter [rad] of the disks of suns that Sky Textures show; None without one."""
+    """Return the largest diameter [rad] of the sun disks of Sky Textures; None without a disk."""
     skies = [one.node for one in shader_sockets.nodes_of(tree) if one.type == "TEX_SKY"]
     sizes = [sky.sun_size for sky in skies if sky.sun_disc and sky.sky_type.endswith("SCATTERING")]
     return max(sizes, default=None)

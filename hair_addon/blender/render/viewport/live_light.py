@@ -38,8 +38,8 @@ _MOST_ASKED = 20  # requested redraws after which a region that was not drawn co
 _SHARES = 16  # number of shares of a picture's paths, each followed between two redraws
 _RAMP = 6  # shares after which paths have replaced dual scattering, at the earliest
 _LEAST_SHARE, _MOST_SHARE = 1024, 16_384  # paths
-# After a picture's paths, shares grow, so that the picture starts again less often: part of the paths so far on a
-# processor and on a GPU, and maximum on a GPU, which draws nothing in that time.
+# Once a picture has its paths, shares grow, so that the picture restarts less often: fraction of the paths so far, on a
+# processor and on a GPU, and maximum on a GPU, which draws nothing while it traces.
 _GROWTH, _GROWTH_ON_GPU, _MOST_ON_GPU = 1.0, 0.25, 131_072
 _HALF_TURN = np.radians(20.0)  # angle of the view at which former paths have half their weight
 _NICE = 10  # priority of the thread, if the system has priorities of threads
@@ -329,7 +329,7 @@ class LiveLight:
 
     @property
     def is_slow(self):
-        """Whether the picture has its paths, and more paths take long, on a processor."""
+        """Whether the picture has its paths, and a processor traces further paths, which takes long."""
         return 0 < self._goal <= self._tried and self._paths is not None and self._paths.grid.device.is_cpu
 
     @property

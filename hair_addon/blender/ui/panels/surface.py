@@ -55,7 +55,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
 
 
 def _draw_lines(layout, context, drawn):
-    """Draw what the rows say while lines of a Curves datablock are drawn."""
+    """Draw a hint and the button that stops drawing lines of a Curves datablock."""
     name = "vellus.draw_parting" if drawn.vellus.kind == "HAIR" else "vellus.draw_flow"
     message = "Draw lines on the surface. They take effect immediately."
     if line_drawing.tie_of(drawn) == context.object:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Buns: hair rises through the tie and is coiled around it, from the top of a flat ball down to the surface.
 
-All guides of a bun have their points at the same places of one line, so that the strands between them are coiled too:
-a mean of guides at different places of a coil is shorter than the coil, and strands that are lengthened to the mean of
-their guides' lengths leave it. So the guides become as long as the coil is. Their ends are tucked in below the coil.
+All guides of a bun have their points at the same places of one line, so that the strands between them are coiled too. A
+mean of guides at different places of a coil would be shorter than the coil, and strands, which are lengthened to the
+mean length of their guides, would leave it. Guides become as long as the coil, and their ends are tucked in below it.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ _TUCKED = 0.4  # turns of the coil's end, below the coil
 _INWARD = 0.5  # radius of the bun where the coil ends, relative to its edge
 _END = 0.45  # radius of the coil's end relative to the coil
 _ON_WAY = 0.25  # share of a guide's segments on its way to the tie
-_STRAIGHT = 0.3  # curvature relative to the bun's edge below which points are not further apart
+_STRAIGHT = 0.3  # curvature relative to the median, below which the distance of points stays
 _RISING, _COILED, _TUCKING = 60, 2000, 200  # points of the parts of the line
 
 
@@ -37,7 +37,7 @@ class Bun:
     radii: np.ndarray
 
     def places(self, count: int) -> np.ndarray:
-        """Return (count,) lengths [m] of line from the tie to its end, closer to each other where it bends more."""
+        """Return (count,) places [m] along the line, from the tie to its end, closer together where it bends more."""
         tangents = np.gradient(self.line.centers, self.line.along, axis=0)
         bends = np.linalg.norm(np.gradient(tangents, self.line.along, axis=0), axis=1)
         # A chord of length s is s² bend / 8 away from its arc.
@@ -64,7 +64,7 @@ def segment_counts(count: int) -> tuple[int, int]:
 
 
 def wound(mesh: TriMesh, query: SurfaceQuery, line: np.ndarray, settings: GatherSettings) -> Bun:
-    """Return the `Bun` at the first point of a line (K, 3) [m], whose direction is where its coil begins."""
+    """Return the `Bun` at the first point of a line (K, 3) [m]. The coil begins in the direction of the line."""
     tie = query.nearest(line[:1])
     normal = mesh_math.normals(mesh, tie)[0].astype(np.float64)
     start = unit(line[1] - line[0])
@@ -72,7 +72,7 @@ def wound(mesh: TriMesh, query: SurfaceQuery, line: np.ndarray, settings: Gather
     side = unit(side) if np.linalg.norm(side) > 0.1 else unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin()]))
     turn, beside, above, radii = _coil(settings)
     flat = beside[:, None] * (np.cos(turn)[:, None] * side + np.sin(turn)[:, None] * np.cross(normal, side))
-    # The edge of the bun lies on the surface where it bends away from the tie.
+    # The edge of the bun follows the surface, which bends away from the tie.
     ground = mesh_math.positions(mesh, query.nearest(line[0] + flat)).astype(np.float64)
     lower = np.clip((ground - line[0]) @ normal, -0.5 * settings.bun_radius, 0.5 * settings.bun_radius)
     points = line[0] + flat + (settings.clearance + above + lower)[:, None] * normal
@@ -83,7 +83,7 @@ def wound(mesh: TriMesh, query: SurfaceQuery, line: np.ndarray, settings: Gather
 
 def coil_radius(settings: GatherSettings) -> float:
     """Return the radius [m] of a coil whose turns lie beside each other from the top of a bun to its edge."""
-    # A quarter of an ellipse is nearly as long as a circle's with the mean of its axes, R - r and _FLAT R - 2 r.
+    # A quarter of an ellipse is nearly as long as that of a circle whose radius is the mean of R - r and _FLAT R - 2 r.
     quarter = 0.25 * np.pi * _OVERLAP
     fitting = quarter * (1.0 + _FLAT) / (2.0 * settings.turns + 3.0 * quarter)
     return min(fitting, _THICKEST) * settings.bun_radius
@@ -92,7 +92,7 @@ def coil_radius(settings: GatherSettings) -> float:
 def _coil(settings):
     """Return the middle of a coil in cylindrical coordinates (M,) around the tie, and its radii (M,).
 
-    They are angles [rad], distances from the axis and heights [m].
+    The coordinates are angles [rad], distances from the axis and heights [m].
     """
     radius = coil_radius(settings)
     wide = settings.bun_radius - radius

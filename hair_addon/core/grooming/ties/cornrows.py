@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cornrows: guides go over the surface to the nearest drawn line, and along it as a braid that lies on the surface.
 
-The way of a root to its row descends the distance from the whole line. There, the guide joins the lock that is
+The way of a root to its row descends the distance from the whole line. At the row, the guide joins the lock that is
 outermost on its side, and follows it to the end of the row and of its tail.
 
-All guides of a row have their points behind the place where they join it at the same places of the row: a strand
-between two guides is a mean of them, which would lie between two places of a lock, out of the braid. So the guides of
-a row become as long as they need to end together. As guides have few points, a pitch has six of them, at which the
-three locks are in the same places.
+From the place where it joins the row, each guide has its points at the same places of the row as all others: a strand
+is a mean of its guides, and a mean of different places of a lock lies outside of the braid. So the guides of a row
+become long enough to end together. Because guides have few points, a pitch has six, at which the three locks are at the
+same places.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ def on_surface(query: SurfaceQuery, mesh: TriMesh, line: np.ndarray) -> tuple[np
 
 
 def row(points: np.ndarray, normals: np.ndarray, tail: float, segments: int, settings: GatherSettings) -> Row:
-    """Return the `Row` over points (M, 3) [m] of the surface, with a straight tail [m], for guides of some segments."""
+    """Return the `Row` over points (M, 3) [m] of the surface, with a straight tail [m]; segments: of each guide."""
     lifted = points + (settings.clearance + _RISE * settings.tie_radius) * normals
     # The derivative at the end, of second order: hair goes on in the direction of a curved row's end.
     ahead = unit(3.0 * lifted[-1] - 4.0 * lifted[-1 - _END] + lifted[-1 - 2 * _END])

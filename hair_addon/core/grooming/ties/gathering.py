@@ -110,7 +110,7 @@ def _along(points, ways):
 
 
 def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
-    """Return the result of `_at_line` for a bun: guides that are long enough for the tie become as long as its coil."""
+    """Return the result of `_at_line` for a bun: guides that reach the tie become as long as the coil."""
     ways, ranks = ways_and_ranks
     bun = buns.wound(mesh, query, line, settings)
     normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
@@ -125,7 +125,7 @@ def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
 
 
 def _in_row(points, ways_and_ranks, surface_below, settings):
-    """Return the result of `_at_line` for a cornrow: guides that are long enough to join it end where it ends."""
+    """Return the result of `_at_line` for a cornrow: guides that reach the row end together."""
     (ways, ranks), (ground, normals) = ways_and_ranks, surface_below
     lengths, on_way, count = split(points)[1].sum(axis=1), _lengths(ways), points.shape[1] - 1
     whole = cornrows.row(ground, normals, 0.0, count, settings)

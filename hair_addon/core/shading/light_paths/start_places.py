@@ -146,7 +146,7 @@ def _spread(holds: wp.array3d[wp.uint8], out_touches: wp.array3d[wp.uint8]):
 
 
 def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> tuple[wp.array3d[wp.uint8], int]:
-    """Return ((Z, Y, X): one in voxels that contain places (N,), and in their neighbors; number without neighbors).
+    """Return ((Z, Y, X): one in voxels that contain places (N,) and in their neighbors; number of voxels with places).
 
     Samples miss thin hair, which may be visible beside them.
     """

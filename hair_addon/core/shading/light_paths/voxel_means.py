@@ -232,8 +232,8 @@ def _keep(
 
 
 def prior_of(path_count: float) -> float:
-    """Return the weight of larger voxels, in paths, for voxels with a number of paths on average: it falls as paths are
-    added, because light leaks past edges by its weight.
+    """Return the weight of larger voxels, in paths, for a mean number of paths per voxel. It falls as paths are added,
+    because larger voxels let light leak past edges.
     """
     return min(max(_FALL / max(path_count, 1.0), _LEAST_PRIOR), MOST_PRIOR)
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tables of hair whose radial roughness varies by a map: layers of `look_tables` at evenly spaced radial roughness.
 
-Layers are at fixed places, so that a strand does not change while others are painted. Between layers values are
-interpolated linearly, which keeps the energy of each.
+Layers have fixed values, so that a strand does not change while others are painted. Values between layers are
+interpolated linearly, which conserves energy.
 """
 
 import math
@@ -21,7 +21,7 @@ _STEP = 0.0625  # of the radial roughness between layers
 
 @dataclass(frozen=True)
 class Layers(_Settings):
-    """Places of layers."""
+    """Radial roughness of the layers."""
 
     low: float = param(0.0, "Radial roughness of the first layer", low=0.0, high=1.0)
     step: float = param(_STEP, "Radial roughness between layers", low=0.0, high=1.0)
@@ -86,7 +86,7 @@ def bake(
     layers: Layers,
     device: str = "cpu",
 ) -> RadialTables:
-    """Bake `RadialTables`; the arguments are those of `look_tables.bake`, whose radial roughness is not used."""
+    """Bake `RadialTables`; arguments as for `look_tables.bake`; the radial roughness of the settings has no effect."""
     radial = layers.low + layers.step * np.arange(round(layers.count))
     every = (replace(settings, radial_roughness=float(each)) for each in radial)
     return RadialTables(tuple(look_tables.bake(each, variation, covered, device) for each in every), layers)

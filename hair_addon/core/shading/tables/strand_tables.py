@@ -85,10 +85,12 @@ def returned(slices: absorption_slices.Slices) -> np.ndarray:
 
 
 def _smoothly_between(values, places, is_even):
-    """Return values (..., N) at places (M,) from 0 to N - 1 along the last axis, by cubics with parabolas' slopes.
+    """Return values (..., N) at places (M,) from 0 to N - 1 along the last axis, by cubics with the slopes of
+    parabolas.
 
-    is_even: whether values are even about the first place, as functions of sigma_a are about zero in its square root.
-    Moments are smooth in sqrt(sigma_a), in which slices are evenly spaced; lines would be off by 1.5/255.
+    is_even: whether values are even functions about the first place, as functions of sigma_a are even in sqrt(sigma_a).
+    Moments are smooth in sqrt(sigma_a), in which slices are evenly spaced; linear interpolation would be off by
+    1.5/255.
     """
     slopes = np.gradient(values, axis=-1, edge_order=2 if values.shape[-1] > 2 else 1)
     if is_even:
