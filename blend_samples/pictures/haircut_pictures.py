@@ -97,7 +97,7 @@ def cut(name):
     """Make a haircut in a window and save its file. Raises `RuntimeError`."""
     extension = build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
     profile, log = OUT / "profile", OUT / f"{name}.log"
-    shutil.rmtree(profile, ignore_errors=True)  # it may have an older extension
+    shutil.rmtree(profile, ignore_errors=True)  # it may contain an older version of the extension
     profile.mkdir(parents=True)
     script = ROOT / "tests" / "desktop" / "haircuts" / "in_window.py"
     words = [name, extension, OUT, BARE_CAT if name == "cat" else BARE, SHOWN, STRANDS]

@@ -120,7 +120,7 @@ class Editing:
         self.evaluate(bpy.context.view_layer.update)
 
     def brush(self, image):
-        """Change an image as a brush does, which costs Blender less than this."""
+        """Change an image as a brush does; a brush costs Blender less time."""
         pixels = np.empty(IMAGE_SIZE * IMAGE_SIZE * 4, np.float32)
         image.pixels.foreach_get(pixels)
         low, left = 512 * (self.turn // 4 % (IMAGE_SIZE // 512)), 512 * (self.turn % (IMAGE_SIZE // 512))
@@ -190,7 +190,7 @@ PARTS["brush"] = (Editing, "brush")
 
 
 def give_maps(hair, settings):
-    """Give settings of the look maps of one image, which a material shows as while it is painted."""
+    """Give settings of the look maps of one image; a material shows the image, as while it is painted."""
     image = bpy.data.images.new("Coat", IMAGE_SIZE, IMAGE_SIZE, alpha=True)
     image.pixels.foreach_set(np.tile(np.float32([0.3, 0.15, 0.05, 1.0]), IMAGE_SIZE * IMAGE_SIZE))
     material = bpy.data.materials.new("Painted")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light Grid by numbers of paths and weights of larger voxels, against Cycles, on random scenes.
+"""Light Grid against Cycles on random scenes, by numbers of paths and weights of larger voxels.
 
 .venv/bin/python tests/benchmarks/viewports/light_of_voxels.py --seeds 911 919 --cycles OPTIX --device cuda
 

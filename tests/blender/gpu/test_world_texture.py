@@ -254,8 +254,8 @@ def test_a_view_has_one_job_while_nodes_change(scene, monkeypatch, other_blender
 
 
 def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_blender):
-    """Until Cycles has rendered other nodes, the world has its viewport color, which it keeps with a message after an
-    error. Panels name the error, and start again.
+    """Until Cycles has rendered other nodes, and after an error, the world has its viewport color. Panels show the
+    error, and their button starts again.
     """
     mixed_world(scene)[0].default_value = (0.1, 0.0, 0.0)
     other_blender(FAIL)

@@ -173,7 +173,7 @@ def test_a_remeshed_surface_has_its_strands_at_the_nearest_points(hair):
 
 
 def test_a_remesh_that_makes_two_walls_of_an_open_surface_is_explained(hair):
-    """Another remesh, of the surface that is closed now, is not."""
+    """A second remesh, of the closed surface, is reported like any edit."""
     skin = bpy.data.objects["Skin"]
     state = bpy.data.objects["Hair Guides"].data.vellus
     assert state.is_on_open

@@ -196,7 +196,7 @@ def test_the_circle_of_the_brush_lies_on_the_surface(guides, place):
 
 
 def test_the_brush_fits_the_surface_until_its_radius_is_set(guides):
-    """The header, which shows the properties of the tool, and the circle have one radius before the first stroke."""
+    """Before the first stroke, the circle has the radius of the header, which shows the properties of the tool."""
     brush = bpy.context.window_manager.operator_properties_last("vellus.paint_flow")
     brush.property_unset("radius")
     fitted = flow_painting.default_radius(guides.data)

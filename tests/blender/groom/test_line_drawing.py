@@ -120,7 +120,7 @@ def test_a_tie_is_drawn_off_the_surface_and_gather_uses_it(hair):
 
 
 def test_lines_are_drawn_on_the_override_of_a_linked_character(hair, tmp_path):
-    """Its collection takes no new objects, and has the same name as the linked surface."""
+    """The overridden collection takes no new objects, and the surface has the same name as the linked surface."""
     override(hair, tmp_path)
     bpy.context.view_layer.objects.active = parts()[0]
     bpy.ops.vellus.add_hair(guide_count=10, strand_count=20)
@@ -132,7 +132,9 @@ def test_lines_are_drawn_on_the_override_of_a_linked_character(hair, tmp_path):
 
 
 def test_lines_that_cannot_be_seen(hair):
-    """Hidden lines are shown, and lines outside of the view layer refused; a tie has no field, so new lines begin."""
+    """Hidden lines are shown. Lines outside of the view layer are refused; for a tie, which has no field, new lines
+    begin.
+    """
     guides, scene = bpy.data.objects["Guides"], bpy.context.scene
     for draw_lines in (bpy.ops.vellus.draw_tie, bpy.ops.vellus.draw_parting):
         bpy.context.view_layer.objects.active = hair

@@ -17,7 +17,7 @@ import pytest
 from hair_addon.blender.host import background_process, cli_command
 from hair_addon.blender.io.pictures import background_jobs
 
-# Another process that ends or fails jobs as their values say.
+# A process in which jobs succeed, fail or crash as their kind says.
 OTHER = """
 import json, os, sys
 from pathlib import Path
@@ -47,7 +47,7 @@ def job(tmp_path, monkeypatch):
 
 
 def test_jobs_have_one_process(job):
-    """Jobs run in turn in one process. A job whose process ends before it begins has another process."""
+    """Jobs run in turn in one process. A job whose process ends before the job begins is sent to another process."""
     works, refused = job("works"), job("too bright")
     assert works._process is refused._process
     for one, complaint in ((works, ""), (refused, "too bright")):

@@ -62,8 +62,8 @@ def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
     arriving = shaded["Combined"][..., :3] / np.maximum(open_to_light["Combined"][..., :3], 1e-6)
     # Hair also sends light to where the sun grazes a surface, which is no shadow.
     off = np.abs(shaded["Shadow"][faces_light] - np.minimum(arriving[faces_light], 1.0))
-    # A rasterized place differs from that of a ray by up to 1/512 pixel. At the border of the hair in its map that
-    # decides whether a lookup is in shadow: one of the four of a sample.
+    # A rasterized place differs from that of a ray by up to 1/512 pixel. At the border of the hair in its map, this
+    # changes one of the four lookups of a sample.
     assert np.quantile(off, 0.995) < 5e-3 and off.max() <= 0.25 and off.mean() < 2e-4
     assert shaded["Shadow"][faces_light].min() < 0.1 and shaded["Shadow"][faces_light].max() == 1.0
     is_hair = shaded["Hair Mask"] > 0.9

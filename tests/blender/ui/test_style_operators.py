@@ -214,7 +214,7 @@ def test_presets_fit_the_surface(hair):
 
 
 def test_locks_of_presets_for_few_strands_are_explained(hair):
-    """The panel names the size that was wanted; with more strands, the size that the preset then gives."""
+    """The panel shows the wanted size and, once there are more strands, the size that the preset then gives."""
     hair.data.vellus.hair.strand_count = 40
     operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
     item = next(item for item in state().styles if item.kind == "CLUMP")

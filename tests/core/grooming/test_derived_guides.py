@@ -52,7 +52,7 @@ def test_errors_are_those_of_what_the_guides_grow(mesh, hair):
 
 @pytest.mark.parametrize("length", [0.3, 3.0])
 def test_more_guides_come_closer_and_the_fit_comes_closer_than_the_strands_themselves(mesh, length):
-    """Also for hair so long that the turn of strands is limited, which the fit does not know."""
+    """Also for hair so long that turns of strands are limited, which the fit ignores."""
     points, roots = strands_between_guides(mesh, length)
     few, more = (derive(mesh, points, roots, complete(mesh, count), count) for count in (15, 60))
     assert more.mean_error < 0.6 * few.mean_error

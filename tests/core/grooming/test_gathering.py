@@ -102,7 +102,9 @@ def test_hair_of_any_length_is_coiled_in_a_bun_with_its_ends_inside(ball):
 
 
 def test_means_of_guides_are_as_long_as_the_coil_of_a_bun(ball):
-    """Strands between guides are lengthened to the mean of the guides' lengths, and stay in the bun if it is theirs."""
+    """Strands are lengthened to the mean length of their guides, and stay in the bun if they are nearly as long
+    already.
+    """
     after, _groups, _held = gathered(ball, guides_on(80), [TAIL], BUN)
     coiled = np.diff(after[:, -IN_BUN:].astype(np.float64), axis=1)
     near = np.argsort(np.linalg.norm(after[:, None, 0] - after[None, :, 0], axis=2), axis=1)[:, :4]

@@ -85,7 +85,7 @@ def silhouette_extents(points):
 def test_the_silhouette_stays_within_the_amplitude_of_styles(hair, name):
     """At each height, hair is within the silhouette of the hair without styles there, grown by the style's amplitude.
 
-    Excepted is 1 % of the points: locks at partings, where hair falls to both sides, and the lowest tips.
+    Up to 1 % of the points may be outside: at partings, where hair falls to both sides, and at the lowest tips.
     """
     style = STYLES[name]
     amplitude = getattr(style, "radius", getattr(style, "amplitude", 0.0))

@@ -100,7 +100,9 @@ def test_many_sizes_are_few_trees(hair, places):
 
 
 def test_only_centers_with_strands_are_styled(hair, places):
-    """Where sizes differ, only centers that strands need are styled; strands have the bits of all centers' styles."""
+    """Where sizes differ, only centers that strands need are styled; strands have the same bits as with all centers
+    styled.
+    """
     number = NumberMap(lambda roots, _ids, _clumps: 0.02 + 0.2 * np.abs(places(roots)))
     styling = hair.bound(clump.Settings(levels=2), inputs=Inputs(numbers={(0, "size"): number}))
     guides = styling.guides(hair.guides)

@@ -217,7 +217,7 @@ BRAIDS = (
 
 
 def row(aside, start, end):
-    """Return places over the scalp, nearly a sphere, from an angle to another behind the top; aside: angle from it."""
+    """Return places on the scalp, nearly a sphere, from one angle behind the top to another; aside: angle to a side."""
     angles = np.linspace(start, end, 20)
     narrow = aside * np.where(angles < 0.8, 1.0, 1.0 - 0.15 * (angles - 0.8))
     radius = 0.088 * (1.0 - 0.1 * aside**2)

@@ -96,7 +96,9 @@ def test_numbers_are_factors(hair):
 
 
 def test_radial_roughness_varies(coat):
-    """A map gives each strand its own radial roughness, and its color the absorption for it; removed, nothing stays."""
+    """A map gives each strand its own radial roughness, with the absorption for its color; nothing stays of a removed
+    map.
+    """
     look = coat.vellus.appearance
     look.color, look.radial_roughness = RED, 0.25
     group = bpy.data.objects["Sphere"].vertex_groups["top"]

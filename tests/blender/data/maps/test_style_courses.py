@@ -123,7 +123,7 @@ def test_a_map_and_a_curve_multiply(curls):
 
 
 def test_curves_of_many_points_are_copied(curls):
-    """A curve that Blender's widget may have, of a hundred points, is copied with its style and by settings."""
+    """A curve of a hundred points, which Blender's widget allows, is copied with its style and by settings."""
     many = " ".join(f"{place / 128:g}:{place % 2}" for place in range(129))
     api.set_course(curls, RADIUS, many)
     assert bpy.ops.vellus.duplicate_style() == {"FINISHED"}

@@ -82,8 +82,8 @@ def turned(camera, degrees):
 
 
 def test_at_rest_the_light_is_that_of_renders(view, fine_shadows):
-    """At rest the light of blocks of pixels equals that of renders within 3 % of the mean, with enough
-    paths for a noise of 2 %.
+    """At rest the light of blocks of pixels equals that of renders within 3 % of the mean, with enough paths for a
+    noise of 2 %.
 
     Dual scattering differs by more.
     """

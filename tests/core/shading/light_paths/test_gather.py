@@ -391,7 +391,7 @@ def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
 
 
 def test_paths_are_added_until_each_voxel_is_known(rng):
-    """The light of visible voxels differs from that of other paths by about the asked noise of both."""
+    """The light of visible voxels differs between two sets of paths by about the noise that was asked for."""
     grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=300)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 1000)

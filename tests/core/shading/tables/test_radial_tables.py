@@ -49,7 +49,7 @@ def test_between_layers_light_is_nearly_the_light_of_the_radial_roughness(tables
 
 
 def test_light_passed_on_is_the_mean_over_strands(tables):
-    """Strands of two radial roughnesses pass on the mean of the light of either."""
+    """Strands with two values of radial roughness pass on the mean of their light."""
     some = np.random.default_rng(0).uniform(0.1, 1.0, (20, 4, 3))
     radial = np.where(np.arange(20) < 5, 0.4375, 0.5)
     parts = [np.stack(at(value).mean_parts(some[radial == value])) for value in (0.4375, 0.5)]
