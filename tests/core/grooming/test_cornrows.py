@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cornrows: guides keep roots and lengths, go to the nearest row, and lie along it on the surface."""
+"""Cornrows: guides keep their roots, go to the nearest row, and lie along it on the surface to its end."""
 
 from dataclasses import replace
 
@@ -41,13 +41,21 @@ def guides():
     return (normals[:, None] * (RADIUS + np.linspace(0.0, 0.1, 25))[:, None]).astype(np.float32)
 
 
+@pytest.fixture(scope="module")
+def braided(ball, guides):
+    """Return (points, groups) of the guides gathered along the rows."""
+    after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    after.setflags(write=False)
+    return after, groups
+
+
 def from_rows(points):
     """Return (S, 2): distances of points (S, 3) from both rows."""
     return np.stack([np.linalg.norm(points[:, None] - row, axis=2).min(axis=1) for row in ROWS], axis=1)
 
 
-def test_guides_lie_along_the_nearest_row(ball, guides):
-    after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+def test_guides_lie_along_the_nearest_row(guides, braided):
+    after, groups = braided
     assert (groups > 0).all()
     np.testing.assert_array_equal(after[:, 0], guides[:, 0])
     tips = from_rows(after[:, -1])
@@ -63,18 +71,18 @@ def test_guides_lie_along_the_nearest_row(ball, guides):
     assert heights.min() > -0.002 and heights.max() < 4.0 * SETTINGS.tie_radius
 
 
-def test_strands_of_a_row_cross_as_a_braid_does(ball, guides):
+def test_strands_of_a_row_cross_as_a_braid_does(braided):
     """Within the last pitch, each guide lies at least a tenth of the radius on either side of the row's middle."""
-    after, _groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    after, _groups = braided
     height = SETTINGS.clearance + 0.6 * SETTINGS.tie_radius  # of the row's middle
     beside = np.abs(after[:, -10:, 0]) - 0.03 * (1.0 + height / RADIUS)
     assert beside.max(axis=1).min() > 0.1 * SETTINGS.tie_radius
     assert beside.min(axis=1).max() < -0.1 * SETTINGS.tie_radius
 
 
-def test_means_of_guides_stay_in_their_lock(ball, guides):
+def test_means_of_guides_stay_in_their_lock(braided):
     """Means of guides are nearly as long as the guides, so strands between them are hardly lengthened."""
-    after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    after, groups = braided
     steps = np.diff(after[:, 12:].astype(np.float64), axis=1)
     for group in np.unique(groups):
         own = steps[groups == group]
@@ -90,9 +98,9 @@ def test_guides_of_few_points_lie_along_their_row(ball, guides, count):
     assert from_rows(after[:, -1]).min(axis=1).max() < 3.0 * SETTINGS.tie_radius
 
 
-def test_groups_are_locks_of_rows(ball, guides):
+def test_groups_are_locks_of_rows(guides, braided):
     """Guides of a group belong to one row, and each row has three groups."""
-    _after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    _after, groups = braided
     rows = from_rows(guides[:, 0]).argmin(axis=1)
     assert (groups > 0).all()
     assert ((groups - 1) // 3 == rows).all()
@@ -110,17 +118,28 @@ def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
     assert np.linalg.norm(beyond - along[:, None] * ahead, axis=1).max() < 0.015
 
 
-def test_a_row_that_moves_by_a_millimeter_moves_no_point_by_more_than_ten(ball, guides):
-    after, _groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+def test_guides_that_are_too_short_for_a_row_do_not_shorten_its_tail(ball, guides):
+    """They are held to their ends, as at other ties."""
+    longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
+    aside = guides[from_rows(guides[:, 0]).min(axis=1) > 2.0 * SETTINGS.tie_radius]
+    stubs = aside[:, :1] + 0.01 * (aside - aside[:, :1])
+    alone, _groups, _held = gathered(ball, longer, ROWS, SETTINGS)
+    after, _groups, held = gathered(ball, np.concatenate([longer, *[stubs] * 4]), ROWS, SETTINGS)
+    assert np.linalg.norm(after[:60, -1] - alone[:, -1], axis=1).max() < SETTINGS.tie_radius
+    assert (held[60:] == 1.0).all() and (held[:60] < 1.0).all()
+
+
+def test_a_row_that_moves_by_a_millimeter_moves_no_point_by_more_than_ten(ball, guides, braided):
+    after, _groups = braided
     moved, _groups, _held = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
     apart = np.linalg.norm(moved - after, axis=2).max(axis=1)
     assert np.median(apart) < 0.004 and apart.max() < 0.010
 
 
 @pytest.mark.parametrize("scale", [0.01, 100.0])
-def test_the_shape_does_not_depend_on_the_scale(guides, scale):
+def test_the_shape_does_not_depend_on_the_scale(guides, braided, scale):
     sizes = {name: getattr(SETTINGS, name) * scale for name in ("clearance", "tie_radius", "pitch", "tail_radius")}
-    expected, _groups, _held = gathered(subdivided_sphere(4, RADIUS), guides, ROWS, SETTINGS)
+    expected, _groups = braided
     rows = [row * scale for row in ROWS]
     found, _groups, _held = gathered(
         subdivided_sphere(4, RADIUS * scale), guides * scale, rows, replace(SETTINGS, **sizes)

@@ -130,20 +130,22 @@ def _in_row(points, ways_and_ranks, surface_below, settings):
     lengths, on_way, count = split(points)[1].sum(axis=1), _lengths(ways), points.shape[1] - 1
     whole = cornrows.row(ground, normals, 0.0, count, settings)
     places, _locks = cornrows.joined_at(whole, ways, settings)
-    tail = max(0.0, float(np.median(lengths - on_way - (whole.on_surface - places))))
+    is_long = lengths > on_way
+    beyond = (lengths - on_way - (whole.on_surface - places))[is_long]
+    tail = max(0.0, float(np.median(beyond))) if len(beyond) else 0.0
     row = cornrows.row(ground, normals, tail, count, settings)
     places, locks = cornrows.joined_at(row, ways, settings)
     braided = cornrows.points_of(row, places, ranks, locks, settings)
     first = np.minimum(np.searchsorted(row.places, places), len(row.places) - 1)
     after = _along(points, ways)
-    for guide in np.flatnonzero(lengths > on_way):
+    for guide in np.flatnonzero(is_long):
         left = braided[guide, first[guide] :]
         before = points.shape[1] - len(left)
         way = np.concatenate([points[guide, :1], ways[guide, 1:], left[:1]])
         after[guide] = np.concatenate([_evenly(way[None], before + 1)[0], left[1:]])
     row_end = np.count_nonzero(row.places <= row.on_surface) - len(row.places)  # from the end
-    held = _lengths(after[:, : after.shape[1] + row_end])
-    return after, locks, held
+    ends = np.where(is_long, _lengths(after[:, : after.shape[1] + row_end]), np.inf)
+    return after, locks, ends
 
 
 def _evenly(ways, count):
