@@ -254,7 +254,7 @@ def test_added_and_mirrored_guides_are_in_groups(guides):
 
 
 def test_guides_that_are_added_to_layers_are_in_the_bun(guides):
-    """Means of turns by whole circles would leave it."""
+    """Means of turns by whole circles would leave the bun."""
     api.add_layer(guides)
     add_line()
     gather(guides, shape="BUN")

@@ -56,10 +56,10 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
 
 
 def _comb_gathered(datablock, points, depsgraph):
-    """Comb those of the last guides that are gathered to points (M, P, 3) in local coordinates, in the active layer.
+    """Comb the gathered guides among the last M to points (M, P, 3) in local coordinates, in the active layer.
 
-    Layers average turns. Guides that are wound around a tie or led along a row turn by more than half a circle, where
-    means of turns are far from means of points.
+    Layers average turns. Guides around a tie or along a row turn by more than half a circle, and means of such turns
+    are far from means of points.
     """
     groups, local = gathered_groups.groups_of(datablock), curves.read_points(datablock)
     if groups is None:
