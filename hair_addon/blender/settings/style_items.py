@@ -53,7 +53,7 @@ class VellusStyle(bpy.types.PropertyGroup):
         "kind": bpy.props.EnumProperty(
             items=[(kind, LABELS[kind], DESCRIPTIONS[kind]) for kind in KINDS], options={"HIDDEN"}
         ),
-        # The wanted and the enlarged size of a preset's locks [m], and the strand count that enlarged them; zero
+        # The wanted and the enlarged size of a preset's locks [m], and the strand count at that time; zero
         # otherwise.
         "lock_wanted": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),
         "lock_enlarged": bpy.props.FloatProperty(min=0.0, options={"HIDDEN"}),

@@ -119,7 +119,7 @@ def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
 
 
 def test_guides_that_are_too_short_for_a_row_do_not_shorten_its_tail(ball, guides):
-    """They are held to their ends, as at other ties."""
+    """Short guides are held up to their ends, as at other ties."""
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
     aside = guides[from_rows(guides[:, 0]).min(axis=1) > 2.0 * SETTINGS.tie_radius]
     stubs = aside[:, :1] + 0.01 * (aside - aside[:, :1])

@@ -215,7 +215,7 @@ def look():
 
 
 def _show():
-    """Draw views and panels again."""
+    """Redraw viewports and panels."""
     for owner in (*bpy.data.worlds, *bpy.data.lights, *bpy.data.materials):
         owner.update_tag()
     for window in bpy.context.window_manager.windows:

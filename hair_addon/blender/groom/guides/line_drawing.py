@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Part lines, flow lines and ties that are drawn with Blender's Draw tool, on the surface."""
+"""Part lines, flow lines and the curves of ties, drawn with Blender's Draw tool."""
 
 import bpy
 from bpy.types import Context, Curves, Object
@@ -28,7 +28,7 @@ _OFF_SURFACE = {"use_stroke_endpoints": True, "surface_plane": "NORMAL_VIEW"}
 
 
 def drawn_for(active: Object | None) -> Curves | None:
-    """Return the Curves whose part lines, flow lines or ties the active object is, in Edit Mode; None otherwise."""
+    """Return the Curves whose part lines, flow lines or ties are the active object in Edit Mode; None otherwise."""
     if active is None or active.type != "CURVE" or active.mode != "EDIT":
         return None
     users = (datablock for datablock in bpy.data.hair_curves if active.name in _names_of(datablock))

@@ -27,7 +27,7 @@ _WITHOUT = {
     "TRIM": ("random", "to_length", "undercoat", "cutter"),
 }
 
-_NEARLY = 0.9  # part of the size of locks; smaller changes are not worth a note
+_NEARLY = 0.9  # fraction of the size of locks above which the fitting size is not noted
 
 _OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
 

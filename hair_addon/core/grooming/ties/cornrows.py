@@ -49,7 +49,7 @@ def on_surface(query: SurfaceQuery, mesh: TriMesh, line: np.ndarray) -> tuple[np
 
 
 def row(points: np.ndarray, normals: np.ndarray, tail: float, segments: int, settings: GatherSettings) -> Row:
-    """Return the `Row` over points (M, 3) [m] of the surface, with a straight tail [m]; segments: of each guide."""
+    """Return the `Row` over points (M, 3) [m] of the surface, with a straight tail [m]; segments: per guide."""
     lifted = points + (settings.clearance + _RISE * settings.tie_radius) * normals
     # The derivative at the end, of second order: hair goes on in the direction of a curved row's end.
     ahead = unit(3.0 * lifted[-1] - 4.0 * lifted[-1 - _END] + lifted[-1 - 2 * _END])
