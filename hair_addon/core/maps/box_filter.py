@@ -75,17 +75,17 @@ class Levels:
         self._shapes = [level.shape for level in levels]
 
     def follow(self, pixels: np.ndarray, changed: tuple[slice, slice] | None) -> None:
-        """Replace the image by one of the same shape, and halve only changed rows; changed: from `changed_box`."""
+        """Replace the image by one of the same shape, and halve only changed texels; changed: from `changed_box`."""
         self.pixels = pixels
         if changed is None:
             return
-        first, last = changed[0].start, changed[0].stop
         ends = np.cumsum([height * width for height, width, _channels in self._shapes])
         levels = [part.reshape(s) for part, s in zip(np.split(self.texels, ends[:-1]), self._shapes, strict=True)]
-        levels[0][first:last] = pixels[first:last]
+        rows, columns = changed
+        levels[0][rows, columns] = pixels[rows, columns]
         for finer, level in itertools.pairwise(levels):
-            first, last = first // 2, (last + 1) // 2
-            level[first:last] = halved(finer[2 * first : 2 * last])
+            rows, columns = (slice(side.start // 2, (side.stop + 1) // 2) for side in (rows, columns))
+            level[rows, columns] = halved(finer[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop])
 
 
 def halved(pixels: np.ndarray) -> np.ndarray:

@@ -4,17 +4,24 @@
 from functools import cache
 
 import numpy as np
+import warp as wp
+
+from ..kernels import parallel
+
+# No gradients are needed. Without fused multiply-add all devices round alike.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 MOST_SIDE = 2048  # texels along a side: larger images are averaged to limit memory
 
 _ROWS_AT_ONCE = 256
+_LEAST_ROWS = 64  # fewer are not worth a thread
 
 
 def masks(
     pixels: np.ndarray, is_srgb: bool = False, has_alpha: bool = True, is_premultiplied: bool = False
 ) -> np.ndarray:
     """Return (H, W, 1) float32 masks of (H, W, C) pixels: the mean of their colors times alpha."""
-    return _reduced(pixels, lambda rows: _mask(_premultiplied(rows, is_srgb, has_alpha, is_premultiplied)))
+    return _reduced(pixels, 1, is_srgb, has_alpha, is_premultiplied)
 
 
 def colors(
@@ -26,7 +33,7 @@ def colors(
     channel is ignored; is_premultiplied: colors are already multiplied by alpha. Images larger than `MOST_SIDE` are
     averaged.
     """
-    return _reduced(pixels, lambda rows: _premultiplied(rows, is_srgb, has_alpha, is_premultiplied))
+    return _reduced(pixels, 4, is_srgb, has_alpha, is_premultiplied)
 
 
 def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | None:
@@ -54,24 +61,91 @@ def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.where(np.isnan(alpha)[:, None], np.nan, found), np.clip(alpha, 0.0, 1.0)
 
 
-def _mask(colored):
-    first = colored[..., :1]
-    is_gray = (colored[..., 1:3] == first).all(axis=-1, keepdims=True)
-    return np.where(is_gray, first, colored[..., :3].mean(axis=-1, keepdims=True)).astype(np.float32)
+def _reduced(pixels, channels, *way):
+    """Return converted pixels, which are averaged by a power of two if a side exceeds `MOST_SIDE`."""
+    height, width = pixels.shape[:2]
+    step = 1
+    while max(height, width) > step * MOST_SIDE:
+        step *= 2
+    if step == 1:
+        return _converted(pixels, channels, *way)
+    blocks = []
+    rows = max(_ROWS_AT_ONCE // step, 1) * step
+    for first in range(0, height, rows):
+        block = _converted(pixels[first : first + rows], channels, *way)
+        block = np.pad(block, ((0, -len(block) % step), (0, -width % step), (0, 0)), mode="edge")
+        blocks.append(block.reshape(len(block) // step, step, block.shape[1] // step, step, -1).mean(axis=(1, 3)))
+    return np.concatenate(blocks)
 
 
-def _premultiplied(rows, is_srgb, has_alpha, is_premultiplied):
-    """Return premultiplied colors (H, W, 4) of rows (H, W, C); non-finite and negative components become 0."""
-    rows = np.where(np.isfinite(rows), rows, np.float32(0.0))
-    channels = rows.shape[2]
-    found = np.ones((*rows.shape[:2], 4), np.float32)
-    color = rows[..., :3] if channels >= 3 else rows[..., :1]
-    found[..., :3] = np.maximum(linear(color) if is_srgb else color, 0.0)
-    if has_alpha and channels in (2, 4):
-        found[..., 3] = np.clip(rows[..., -1], 0.0, 1.0)
-        if not is_premultiplied:
-            found[..., :3] *= found[..., 3:]
+def _converted(pixels, channels, is_srgb, has_alpha, is_premultiplied):
+    """Return premultiplied colors (H, W, 4), or masks (H, W, 1), of pixels (H, W, C)."""
+    found = np.empty((*pixels.shape[:2], channels), np.float32)
+    source, target = (
+        wp.array(np.ascontiguousarray(values, np.float32), dtype=float, ndim=3, device="cpu", copy=False)
+        for values in (pixels, found)
+    )
+    bytes_ = wp.array(_linear_bytes(), dtype=float, device="cpu", copy=False)
+    has_alpha = has_alpha and pixels.shape[2] in (2, 4)
+    inputs = [parallel.Rows(source), bytes_, bool(is_srgb), has_alpha, has_alpha and not is_premultiplied]
+    parallel.launch(_convert, len(pixels), inputs=inputs, outputs=[target], device="cpu", least_rows=_LEAST_ROWS)
     return found
+
+
+@wp.kernel
+def _convert(
+    pixels: wp.array3d[float],
+    linear_bytes: wp.array[float],
+    is_srgb: bool,
+    has_alpha: bool,
+    is_straight: bool,
+    # outputs
+    out_pixels: wp.array3d[float],
+):
+    """Convert a row: non-finite and negative components become 0, and colors are multiplied by alpha if straight."""
+    row = wp.tid()
+    channels = pixels.shape[2]
+    for column in range(pixels.shape[1]):
+        red = _component(pixels[row, column, 0], is_srgb, linear_bytes)
+        green = red
+        blue = red
+        if channels >= 3:
+            green = _component(pixels[row, column, 1], is_srgb, linear_bytes)
+            blue = _component(pixels[row, column, 2], is_srgb, linear_bytes)
+        alpha = float(1.0)
+        if has_alpha:
+            alpha = _within_one(pixels[row, column, channels - 1])
+        if is_straight:
+            red *= alpha
+            green *= alpha
+            blue *= alpha
+        if out_pixels.shape[2] == 4:
+            out_pixels[row, column, 0] = red
+            out_pixels[row, column, 1] = green
+            out_pixels[row, column, 2] = blue
+            out_pixels[row, column, 3] = alpha
+        else:
+            mean = (red + green + blue) / 3.0
+            if red == green and red == blue:
+                mean = red  # without rounding
+            out_pixels[row, column, 0] = mean
+
+
+@wp.func
+def _component(value: float, is_srgb: bool, linear_bytes: wp.array[float]) -> float:
+    """Return a linear component of a color."""
+    if not wp.isfinite(value):
+        return 0.0
+    if is_srgb:
+        return linear_bytes[int(wp.rint(_within_one(value) * 255.0))]
+    return wp.max(value, 0.0)
+
+
+@wp.func
+def _within_one(value: float) -> float:
+    if not wp.isfinite(value):
+        return 0.0
+    return wp.min(wp.max(value, 0.0), 1.0)
 
 
 def linear(encoded: np.ndarray) -> np.ndarray:
@@ -83,23 +157,6 @@ def linear(encoded: np.ndarray) -> np.ndarray:
 def _linear_bytes():
     values = np.arange(256) / 255.0
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def _reduced(pixels, convert):
-    """Return pixels converted in blocks of rows, and averaged by a power of two if a side exceeds `MOST_SIDE`."""
-    height, width = pixels.shape[:2]
-    step = 1
-    while max(height, width) > step * MOST_SIDE:
-        step *= 2
-    blocks = []
-    rows = max(_ROWS_AT_ONCE // step, 1) * step
-    for first in range(0, height, rows):
-        block = convert(pixels[first : first + rows])
-        if step > 1:
-            block = np.pad(block, ((0, -len(block) % step), (0, -width % step), (0, 0)), mode="edge")
-            block = block.reshape(len(block) // step, step, block.shape[1] // step, step, -1).mean(axis=(1, 3))
-        blocks.append(block)
-    return np.concatenate(blocks)
 
 
 def reduced_size(width: int, height: int) -> tuple[int, int]:
