@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
+from ...core import maps
 from ...core.cards import mesh_strands
 from ...core.cards.mesh_strand_settings import MeshStrandSettings
 from ...core.errors import HairError
@@ -15,7 +16,6 @@ from ...core.files.curve_file import CurveSet
 from ...core.geometry.mesh import TriMesh
 from ...core.grooming.derived_guides import DerivationSettings
 from ...core.long_work import Work, part_of
-from ...core.maps import pixels
 from ...core.maps.map_settings import MapSettings
 from ...core.params import Param, plain_value
 from ..data import scene, usable_surfaces, whole_changes
@@ -89,7 +89,7 @@ def using_mesh(
         means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
         if settings.reaches_surface:
             found = mesh_strands.on_surface(found, surface)
-        return found, None if means is None else pixels.unpremultiplied(means)[0]
+        return found, None if means is None else maps.pixels.unpremultiplied(means)[0]
 
     found, colors = yield compute
     surface_object = its_surface.find()

@@ -5,7 +5,7 @@
 """
 
 from ..data import guide_map_readers, scene, subdivided_surfaces, usable_surfaces
-from ..data.maps import image_pixels, sources
+from ..data.maps import image_pixels, sources, strand_maps
 from ..data.pictures import (
     drawn_meshes,
     light_panoramas,
@@ -82,6 +82,8 @@ OTHERS = (
     scene.surface_cache,
     sources.texel_cache,
     sources.level_cache,
+    sources.mean_cache,
+    strand_maps.look_cache,
     image_pixels.converted_cache,
     drawn_meshes.layout_cache,
     surface_means.picture_cache,

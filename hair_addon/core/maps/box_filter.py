@@ -37,6 +37,35 @@ class _Taps:
         """The smallest and the largest texel index."""
         return np.array([self.texels.min(initial=0), self.texels.max(initial=0)])
 
+    @cached_property
+    def boxes(self) -> tuple[np.ndarray, ...]:
+        """First and last rows, first and last columns (N,) of the image's texels in the share of each strand."""
+        width, height = self.size
+        shapes = [(height, width)]
+        while max(height, width) > 1:
+            height, width = (height + 1) // 2, (width + 1) // 2
+            shapes.append((height, width))
+        firsts = np.cumsum([0, *(height * width for height, width in shapes[:-1])], dtype=np.int32)
+        level = np.searchsorted(firsts, self.texels[:, 0], side="right") - 1  # the same of all texels of a strand
+        widths = np.array(shapes, np.int32)[level, 1]
+        places = np.divmod(self.texels - firsts[level][:, None], widths[:, None])
+        ends = ((side.min(axis=1) << level, (side.max(axis=1) + 1 << level) - 1) for side in places)
+        return tuple(itertools.chain.from_iterable(ends))
+
+    def touching(self, box: tuple[slice, slice]) -> np.ndarray:
+        """Return indices of `strands` whose share may touch texels in a box, as of `changed_box`."""
+        first_row, last_row, first_column, last_column = self.boxes
+        rows, columns = box
+        is_touched = (first_row < rows.stop) & (last_row >= rows.start)
+        return np.flatnonzero(is_touched & (first_column < columns.stop) & (last_column >= columns.start))
+
+    def __len__(self) -> int:
+        return len(self.strands)
+
+    def __getitem__(self, selection: np.ndarray) -> "_Taps":
+        """Return the taps of some of the strands."""
+        return _Taps(self.strands[selection], self.texels[selection], self.weights[selection], self.size)
+
 
 @dataclass(frozen=True, eq=False)
 class RootTexels:
@@ -55,10 +84,21 @@ class RootTexels:
         found = np.full((self.strand_count, channels), np.nan, np.float32)
         for tile, taps in self.tiles.items():
             if tile in levels:
-                size = levels[tile].pixels.shape[1::-1]
-                if size != tuple(taps.size):
-                    raise ValueError(f"pixels of size {size} at places for {taps.size}")
-                found[taps.strands] = _means(taps, levels[tile].texels)
+                found[taps.strands] = _means(taps, levels[tile])
+        return found
+
+    def follow(self, before: np.ndarray, levels: "Levels", changed: tuple[slice, slice] | None) -> np.ndarray:
+        """Return the means (S, C) of an image without tiles; only strands at changed texels are sampled.
+
+        before: (S, C) when the image had other texels in a box, as of `changed_box`.
+        """
+        taps = self.tiles.get(None)
+        if changed is None or taps is None:
+            return before
+        touched = taps.touching(changed)
+        some = taps if 2 * len(touched) > len(taps) else taps[touched]
+        found = before.copy()
+        found[some.strands] = _means(some, levels)
         return found
 
 
@@ -99,7 +139,10 @@ def halved(pixels: np.ndarray) -> np.ndarray:
     return rows[:, ::2] + rows[:, 1::2]
 
 
-def _means(taps, texels):
+def _means(taps, levels):
+    size, texels = levels.pixels.shape[1::-1], levels.texels
+    if size != tuple(taps.size):
+        raise ValueError(f"pixels of size {size} at places for {taps.size}")
     require_indices("texels", taps.limits, len(texels))
     sources, cells, weights, found = (
         wp.array(values, dtype=kind, ndim=2, device="cpu", copy=False)

@@ -50,6 +50,13 @@ class StrandLooks:
         radial = None if self.radial is None else self.radial[selection]
         return StrandLooks(self.root[selection], self.tip[selection], self.roughness[selection], radial)
 
+    def replaced(self, strands: np.ndarray, looks: "StrandLooks") -> "StrandLooks":
+        """Return these looks with `looks` (N,) in place of those of strands (N,), which are indices."""
+        found = [values.copy() for values in self._arrays]
+        for values, others in zip(found, looks._arrays, strict=True):
+            values[strands] = others
+        return StrandLooks(*found)
+
     def is_same(self, others: "StrandLooks | None") -> bool:
         """Return whether the looks are bit-identical to others."""
         if others is None or (self.radial is None) != (others.radial is None):

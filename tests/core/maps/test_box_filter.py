@@ -45,6 +45,26 @@ def test_levels_follow_changes(rng, shape):
         np.testing.assert_array_equal(levels.texels, box_filter.Levels(image).texels)
 
 
+@pytest.mark.parametrize("shape", [(64, 128, 4), (37, 53, 1), (1, 1, 1), (300, 7, 4)])
+def test_means_follow_changes(rng, shape):
+    """Strands whose shares touch changed texels get its means, bit for bit; all others keep theirs."""
+    mesh, uvs = plane()
+    uvs = 1.5 * uvs - np.float32(0.25)  # repeats
+    uvs[2] = uvs[2, :1]  # without an area
+    image = rng.random(shape).astype(np.float32)
+    texels = box_filter.root_texels(mesh, uvs, roots_on(mesh, 300, rng), {None: shape[1::-1]})
+    levels = box_filter.Levels(image)
+    means = texels.sample({None: levels})
+    for _ in range(12):
+        low, left = (rng.integers(0, side) for side in shape[:2])
+        before, image = image, image.copy()
+        image[low : low + rng.integers(0, 9), left : left + rng.integers(1, 9)] = rng.random()
+        changed = pixels.changed_box(before, image)
+        levels.follow(image, changed)
+        means = texels.follow(means, levels, changed)
+        np.testing.assert_array_equal(means, texels.sample({None: image}))
+
+
 def test_the_changed_box_holds_all_changes(rng):
     """The box of changed texels is the smallest that holds them; images of the same bits have none."""
     image = rng.random((20, 30, 4)).astype(np.float32)

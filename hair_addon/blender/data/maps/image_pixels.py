@@ -2,6 +2,7 @@
 """Pixels of images and of their UDIM tiles, as core/maps/pixels.py takes them."""
 
 import hashlib
+import sys
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,8 +10,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ....core import maps
 from ....core.errors import HairError
-from ....core.maps import pixels
 from ...host.caches import Cache
 from ...host.notices import name_of
 
@@ -74,7 +75,7 @@ def changed_since(before, now):
     if before is now:
         return None
     known = (each for each in converted_cache.values() if each.before is before and each.pixels is now)
-    return next((each.changed for each in known), None) or pixels.changed_box(before, now)
+    return next((each.changed for each in known), None) or maps.pixels.changed_box(before, now)
 
 
 def _raw(image, into=None):
@@ -128,21 +129,36 @@ def _pixels_of(image, named, is_color, is_painted=False):
     width, height = image.size
     if not (width and height and image.channels):
         raise _without_pixels(named)
-    convert = pixels.colors if is_color else pixels.masks
+    convert = maps.pixels.colors if is_color else maps.pixels.masks
     way = conversion_of(image)
-    if not is_painted or max(width, height) > pixels.MOST_SIDE:
+    if not is_painted or max(width, height) > maps.pixels.MOST_SIDE:
         return convert(_raw(image), **way)
     key = image.session_uid, is_color
     known = converted_cache.get(key)
     raw = _raw(image, None if known is None else known.spare)
     if known is None or known.way != way or known.raw.shape != raw.shape:
         return converted_cache.keep(key, _Converted(raw, way, convert(raw, **way))).pixels
-    changed = pixels.changed_box(known.raw, raw)
+    changed = maps.pixels.changed_box(known.raw, raw)
     if changed is None:
         return converted_cache.keep(key, replace(known, raw=raw, spare=known.raw)).pixels
-    found = known.pixels.copy()  # other users of the image compare their pixels with it
+    found = _writable(known)
     found[changed] = convert(raw[changed], **way)
     return converted_cache.keep(key, _Converted(raw, way, found, known.raw, known.pixels, changed)).pixels
+
+
+def _writable(known):
+    """Return a copy of the converted pixels of a `_Converted`: other users of the image compare their pixels with it.
+
+    The array before the last change is written again if nobody else refers to it, as it differs only in a box.
+    """
+    if known.changed is None or sys.getrefcount(known.before) > _REFERENCES:
+        return known.pixels.copy()
+    found = known.before
+    found[known.changed] = known.pixels[known.changed]
+    return found
+
+
+_REFERENCES = 2  # of an array that a `_Converted` alone refers to, including the argument of `getrefcount`
 
 
 def conversion_of(image):

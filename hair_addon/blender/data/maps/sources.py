@@ -9,7 +9,7 @@ import numpy as np
 from ....core import maps
 from ....core.errors import HairError
 from ....core.geometry.mesh import SurfacePoints
-from ....core.maps import combination, pixels
+from ....core.maps import combination
 from ....core.maps.map_settings import MapSettings
 from ....core.params import Param
 from ...host.caches import Cache
@@ -135,12 +135,26 @@ class Source:
         if known is None or not (known.roots.is_same(roots) and np.array_equal(known.corner_uvs, self.corners)):
             texels = maps.box_filter.root_texels(self.surface.mesh, self.corners, roots, sizes)
             known = texel_cache.keep(key, _Known(roots, self.corners, sizes, texels))
-        return known.texels.sample({tile: self._levels(tile, values) for tile, values in self.pixels.items()})
+        if set(self.pixels) != {None}:
+            return known.texels.sample(self.pixels)
+        key = self.hair_uid, self.settings.uv, self.settings.source, self.is_color
+        before = mean_cache.get(key)
+        means = self._means(known.texels, before)
+        mean_cache.keep(key, _Means(known.texels, self.pixels[None], means))
+        return means
 
-    def _levels(self, tile, values):
-        """Return the `Levels` of an image; those of an image without tiles are kept, and updated when it changes."""
-        if tile is not None:
-            return maps.box_filter.Levels(values)
+    def _means(self, texels, before):
+        """Return the means of an image without tiles; if texels have changed, other strands keep the means before."""
+        now = self.pixels[None]
+        if before is None or before.texels is not texels:
+            return texels.sample({None: self._levels(now)})
+        if before.pixels is now:
+            return before.means
+        changed = image_pixels.changed_since(before.pixels, now)
+        return texels.follow(before.means, self._levels(now), changed)
+
+    def _levels(self, values):
+        """Return the `Levels` of an image without tiles, which are kept, and updated when it changes."""
         key = self.settings.source, self.is_color
         levels = level_cache.get(key)
         if levels is None or levels.pixels.shape != values.shape:
@@ -154,7 +168,7 @@ def masks(strands: Strands, settings: MapSettings, image) -> np.ndarray:
 
     image: of a map of the kind IMAGE.
     """
-    return _of_strands(strands, settings, image)[0][:, 0]
+    return values_of(strands, settings, image)[0][:, 0]
 
 
 def varied_numbers(
@@ -164,20 +178,17 @@ def varied_numbers(
 
     ramp: (N, 1) of `ramps.map_samples`.
     """
-    found, how = _of_strands(strands, settings, image, ramp=ramp)
+    found, how = values_of(strands, settings, image, ramp=ramp)
     return combination.varied_number(value, found[:, 0], how, details)
 
 
-def varied_colors(
-    strands: Strands, settings: MapSettings, image, value: tuple, details: Param, ramp: np.ndarray | None = None
-) -> np.ndarray:
-    """Return (S, 3) float64 of a color by its map, as `varied_numbers`; ramp: (N, 4)."""
-    found, how = _of_strands(strands, settings, image, ramp is None, ramp)
-    return combination.varied_color(value, *pixels.unpremultiplied(found), how, details)
+def values_of(
+    strands: Strands, settings: MapSettings, image, is_color: bool = False, ramp: np.ndarray | None = None
+) -> tuple[np.ndarray, combination.Combination]:
+    """Return (`Source.values` of strands, their `Combination`). Raises `HairError` if the source is missing.
 
-
-def _of_strands(strands, settings, image, is_color=False, ramp=None):
-    """Return (values of strands, their `Combination`)."""
+    is_color: of the values before the ramp; ramp: (N, 1 or 4) of `ramps.map_samples`.
+    """
     if settings.kind == "CLUMP" and strands.clumps is None:
         raise HairError("There are no clumps for a random map: add the style Clump.")
     if settings.kind in _ON_SURFACE and strands.roots is None:
@@ -255,6 +266,19 @@ class _Known:
 texel_cache = Cache(capacity=16)
 # (name of an image, whether as colors) → `Levels` of an image without tiles.
 level_cache = Cache(capacity=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Means:
+    """Means (S, C) of an image without tiles, and the `RootTexels` and pixels that they depend on."""
+
+    texels: "maps.box_filter.RootTexels"
+    pixels: np.ndarray
+    means: np.ndarray
+
+
+# (session_uid of hair, UV map, name of an image, whether as colors) → `_Means`, which are compared.
+mean_cache = Cache(capacity=4)
 
 
 def _corner_uvs(surface_object, surface, name):

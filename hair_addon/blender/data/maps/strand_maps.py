@@ -4,11 +4,16 @@
 One function computes the arrays, which the hair's Curves store for viewports and renders.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ....core import maps
 from ....core.errors import HairError
-from ....core.maps import varied_settings
+from ....core.maps import combination, varied_settings
+from ....core.shading.appearance import Appearance
 from ....core.shading.strand_looks import StrandLooks, strand_looks
+from ...host.caches import Cache
 from ...settings import map_items, properties, shared_wetness
 from ..strands import attributes
 from . import ramps, sources
@@ -16,6 +21,20 @@ from . import ramps, sources
 # Attributes of the hair's Curves; the last is absent if the radial roughness does not vary.
 ROOT, TIP, ROUGHNESS, RADIAL = "root_absorption", "tip_absorption", "strand_roughness", "strand_radial_roughness"
 _LAYOUT = ((ROOT, "FLOAT_VECTOR"), (TIP, "FLOAT_VECTOR"), (ROUGHNESS, "FLOAT"))
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """`StrandLooks` and what determines them; given: {field of `Appearance`: (values of strands, `Combination`)}."""
+
+    look: Appearance
+    given: dict
+    randoms: np.ndarray
+    looks: StrandLooks
+
+
+# session_uid of hair → `_Known`, which is compared.
+look_cache = Cache(capacity=4)
 
 
 def has_looks(state) -> bool:
@@ -39,7 +58,7 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
     if strands is None:
         strands = sources.stored_strands(hair)
     look, errors = properties.own_look_of(hair.vellus), []
-    varied = {}
+    given = {}
     for item in hair.vellus.maps:
         section, _, name = item.setting.partition(".")
         if section != "look" or item.setting not in varied_settings.all_varied() or not map_items.is_set(item):
@@ -47,18 +66,63 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
         if item.setting == shared_wetness.SETTING or not varied_settings.is_used(item.setting, look.parametrization):
             continue
         try:
-            varied[name] = _varied(strands, item, getattr(look, name))
+            given[name] = _values(strands, item)
         except HairError as error:
             errors.append(error)
-    return strand_looks(look, varied, strands.randoms), errors
+    return _followed(hair.session_uid, look, given, strands.randoms), errors
 
 
-def _varied(strands, item, value):
-    """Return (S,) or (S, 3) of a setting by its map."""
-    settings, details = map_items.settings_of(item), varied_settings.all_varied()[item.setting][1]
+def _values(strands, item):
+    """Return (values of strands, their `Combination`) of a map."""
     is_color = varied_settings.is_color(item.setting)
-    vary = sources.varied_colors if is_color else sources.varied_numbers
-    return vary(strands, settings, item.image, value, details, ramps.map_samples(item, is_color))
+    ramp = ramps.map_samples(item, is_color)
+    return sources.values_of(strands, map_items.settings_of(item), item.image, is_color and ramp is None, ramp)
+
+
+def _followed(hair_uid, look, given, randoms):
+    """Return `StrandLooks`; those known of the hair are reused for strands whose values have not changed."""
+    known = look_cache.get(hair_uid)
+    changed = None if known is None else _changed(known, look, given, randoms)
+    if changed is None:
+        found = _looks(look, given, randoms)
+    else:
+        some = {name: (values[changed], how) for name, (values, how) in given.items()}
+        found = known.looks.replaced(changed, _looks(look, some, randoms[changed]))
+    look_cache.keep(hair_uid, _Known(look, given, randoms, found))
+    return found
+
+
+def _changed(known, look, given, randoms):
+    """Return the indices of strands whose values differ from the known ones; None if most may differ."""
+    hows = [{name: how for name, (_values, how) in each.items()} for each in (known.given, given)]
+    pairs = [(known.randoms, randoms), *((known.given[n][0], given[n][0]) for n in given if n in known.given)]
+    if known.look != look or hows[0] != hows[1] or any(one.dtype != two.dtype for one, two in pairs):
+        return None
+    if any(one.shape != two.shape for one, two in pairs):
+        return None
+    is_changed = np.zeros(len(randoms), bool)
+    for one, two in pairs:
+        if one is not two:
+            is_changed |= (_bits(one) != _bits(two)).any(axis=1)
+    found = np.flatnonzero(is_changed)
+    return found if 2 * len(found) <= len(randoms) else None
+
+
+def _bits(values):
+    return np.ascontiguousarray(values).view(f"i{values.itemsize}").reshape(len(values), -1)
+
+
+def _looks(look, given, randoms):
+    varied = {}
+    for name, (values, how) in given.items():
+        setting, value = f"look.{name}", getattr(look, name)
+        details = varied_settings.all_varied()[setting][1]
+        if varied_settings.is_color(setting):
+            colors, alpha = maps.pixels.unpremultiplied(values)
+            varied[name] = combination.varied_color(value, colors, alpha, how, details)
+        else:
+            varied[name] = combination.varied_number(value, values[:, 0], how, details)
+    return strand_looks(look, varied, randoms)
 
 
 def write_looks(hair) -> list[HairError]:

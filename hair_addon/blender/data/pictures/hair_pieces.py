@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....core import maps
 from ....core.errors import HairError
 from ....core.geometry.mesh import SurfacePoints
-from ....core.maps import pixels
 from ...host.notices import name_of
 from .. import scene
 from ..maps import image_pixels
@@ -66,7 +66,7 @@ class HairPieces:
             if uvs is not None and material.alpha_image is not None:
                 alpha *= _sampled(material.alpha_image, uvs[rows])[:, material.alpha_channel]
             if uvs is not None and material.color_image is not None:
-                color = pixels.unpremultiplied(_sampled(material.color_image, uvs[rows]))[0]
+                color = maps.pixels.unpremultiplied(_sampled(material.color_image, uvs[rows]))[0]
             elif self.corner_colors is not None:
                 corners = self.corner_colors[places.triangle[rows], :, :3]
                 color = np.einsum("nc,ncv->nv", weights[rows], corners)

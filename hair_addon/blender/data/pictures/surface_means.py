@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ....core import maps
 from ....core.imaging import texture_means
-from ....core.maps import pixels
 from ...host import scene_time
 from ...host.caches import Cache
 from ..maps import image_pixels
@@ -80,7 +80,7 @@ def _picture_of(image):
     width, height = image.size
     raw = np.empty((height, width, image.channels), np.float32)
     image.pixels.foreach_get(raw.ravel())
-    picture = pixels.colors(_reduced(raw), **image_pixels.conversion_of(image))
+    picture = maps.pixels.colors(_reduced(raw), **image_pixels.conversion_of(image))
     if known is not None and np.array_equal(known[1], picture):
         picture = known[1]
     return picture_cache.keep(image.session_uid, (kinds, picture))[1]
@@ -106,7 +106,7 @@ def _as_drawn(picture, image, image_map):
     """Return the colors of a picture as shaders read them, premultiplied unless the image is opaque."""
     if not image_map.is_opaque or image.is_float or image.alpha_mode != "STRAIGHT":
         return picture
-    return pixels.unpremultiplied(picture.reshape(-1, 4))[0].reshape(*picture.shape[:2], 3)
+    return maps.pixels.unpremultiplied(picture.reshape(-1, 4))[0].reshape(*picture.shape[:2], 3)
 
 
 def _of_part(means, uvs):

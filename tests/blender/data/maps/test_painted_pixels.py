@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Only changed rows of painted images are converted, with the same result as converting the whole image."""
+"""Only changed texels of painted images, and strands at them, are read again: with the same result as all of them."""
 
 import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.maps import image_pixels
+from hair_addon.blender.data.maps import image_pixels, sources, strand_maps
+from hair_addon.blender.host.caches import Cache
+from hair_addon.blender.settings import map_items
 from hair_addon.core.maps import pixels
+from hair_addon.core.maps.map_settings import MapSettings
 
 
 def converted_rows(monkeypatch):
@@ -65,3 +68,66 @@ def test_other_color_spaces_and_sizes_convert_all(hair, rng):
     found = image_pixels.read(image, True)[None]
     assert found.shape == (8, 8, 4)
     np.testing.assert_array_equal(found, fresh(image, True))
+
+
+def test_strokes_reuse_arrays_that_nobody_holds(hair, rng):
+    """Strokes are read into two arrays in turn, but not into arrays that somebody still holds."""
+    image = bpy.data.images.new("Painted", 24, 40, alpha=True)
+    held, kept, places = [], [], []
+    for turn in range(8):
+        values = np.array(image.pixels[:], np.float32).reshape(40, 24, 4)
+        values[5 * turn : 5 * turn + 7, 2 * turn : 2 * turn + 4] = rng.random(4)
+        image.pixels.foreach_set(values.ravel())
+        found = image_pixels.read(image, True)[None]
+        np.testing.assert_array_equal(
+            found, pixels.colors(image_pixels._raw(image), **image_pixels.conversion_of(image))
+        )
+        places.append(found.ctypes.data)
+        if turn in (3, 4):
+            held.append(found)
+            kept.append(found.copy())
+        del found
+    assert places[2] == places[0] != places[1] == places[3]
+    np.testing.assert_array_equal(held, kept)
+
+
+WAYS = [
+    {"look.color": {}},
+    {"look.color": {"is_inverted": True, "amount": 0.7}, "look.roughness": {"low": 0.5, "high": 2.0}},
+    {
+        "look.color": {"ramp": "0:0.5/0.1/0.05 1:0.05/0.1/0.5"},
+        "look.radial_roughness": {"low": 0.3, "is_inverted": True},
+    },
+]
+
+CACHES = [
+    (image_pixels, "converted_cache"),
+    (sources, "level_cache"),
+    (sources, "mean_cache"),
+    (strand_maps, "look_cache"),
+]
+
+
+@pytest.mark.parametrize("maps", WAYS)
+def test_strokes_change_their_strands_as_a_new_reading_does(hair, rng, monkeypatch, maps):
+    """After each stroke, also at borders of the image, all strands have bit for bit the looks of a new reading."""
+    image = bpy.data.images.new("Painted", 128, 96, alpha=True)
+    values = rng.random((96, 128, 4), np.float32)
+    image.pixels.foreach_set(values.ravel())
+    hair.data.vellus.appearance.parametrization = "COLOR"
+    for setting, changes in maps.items():
+        map_items.keep(hair.data.vellus, MapSettings(setting=setting, source=image.name, **changes))
+    counts, compute = [], strand_maps.strand_looks
+    monkeypatch.setattr(strand_maps, "strand_looks", lambda *given: counts.append(len(given[2])) or compute(*given))
+    count = len(strand_maps.looks_of(hair.data)[0])
+    boxes = [(0, 0, 9, 9), (90, 120, 6, 8), (40, 60, 1, 1), (30, 0, 11, 128), (0, 0, 96, 128), (50, 20, 13, 7)]
+    for row, column, height, width in boxes:
+        values[row : row + height, column : column + width] = rng.random(4)
+        image.pixels.foreach_set(values.ravel())
+        counts.clear()
+        looks = strand_maps.looks_of(hair.data)[0]
+        assert counts[0] == count if height == 96 else counts[0] < 0.4 * count
+        with monkeypatch.context() as anew:
+            for module, name in CACHES:
+                anew.setattr(module, name, Cache())
+            assert looks.is_same(strand_maps.looks_of(hair.data)[0])
