@@ -39,21 +39,21 @@ class _Taps:
 
     @cached_property
     def boxes(self) -> tuple[np.ndarray, ...]:
-        """First and last rows, first and last columns (N,) of the image's texels in the share of each strand."""
+        """First and last rows, and first and last columns (N,), of the image's texels in the share of each strand."""
         width, height = self.size
         shapes = [(height, width)]
         while max(height, width) > 1:
             height, width = (height + 1) // 2, (width + 1) // 2
             shapes.append((height, width))
         firsts = np.cumsum([0, *(height * width for height, width in shapes[:-1])], dtype=np.int32)
-        level = np.searchsorted(firsts, self.texels[:, 0], side="right") - 1  # the same of all texels of a strand
+        level = np.searchsorted(firsts, self.texels[:, 0], side="right") - 1  # the same for all texels of a strand
         widths = np.array(shapes, np.int32)[level, 1]
         places = np.divmod(self.texels - firsts[level][:, None], widths[:, None])
         ends = ((side.min(axis=1) << level, (side.max(axis=1) + 1 << level) - 1) for side in places)
         return tuple(itertools.chain.from_iterable(ends))
 
     def touching(self, box: tuple[slice, slice]) -> np.ndarray:
-        """Return indices of `strands` whose share may touch texels in a box, as of `changed_box`."""
+        """Return the indices in `strands` of strands whose share may touch texels in a box from `changed_box`."""
         first_row, last_row, first_column, last_column = self.boxes
         rows, columns = box
         is_touched = (first_row < rows.stop) & (last_row >= rows.start)
@@ -90,7 +90,7 @@ class RootTexels:
     def follow(self, before: np.ndarray, levels: "Levels", changed: tuple[slice, slice] | None) -> np.ndarray:
         """Return the means (S, C) of an image without tiles; only strands at changed texels are sampled.
 
-        before: (S, C) when the image had other texels in a box, as of `changed_box`.
+        before: (S, C) means before the change; changed: the box of the change, from `changed_box`.
         """
         taps = self.tiles.get(None)
         if changed is None or taps is None:

@@ -47,7 +47,7 @@ def test_levels_follow_changes(rng, shape):
 
 @pytest.mark.parametrize("shape", [(64, 128, 4), (37, 53, 1), (1, 1, 1), (300, 7, 4)])
 def test_means_follow_changes(rng, shape):
-    """Strands whose shares touch changed texels get its means, bit for bit; all others keep theirs."""
+    """After a change, means are bit for bit those of a new reading; only strands at changed texels are sampled."""
     mesh, uvs = plane()
     uvs = 1.5 * uvs - np.float32(0.25)  # repeats
     uvs[2] = uvs[2, :1]  # without an area

@@ -147,9 +147,10 @@ def _pixels_of(image, named, is_color, is_painted=False):
 
 
 def _writable(known):
-    """Return a copy of the converted pixels of a `_Converted`: other users of the image compare their pixels with it.
+    """Return a copy of the converted pixels of a `_Converted`, because other users of the image compare with these
+    pixels.
 
-    The array before the last change is written again if nobody else refers to it, as it differs only in a box.
+    The array before the last change is reused if nothing else refers to it, because it differs only in a box.
     """
     if known.changed is None or sys.getrefcount(known.before) > _REFERENCES:
         return known.pixels.copy()
@@ -158,7 +159,7 @@ def _writable(known):
     return found
 
 
-_REFERENCES = 2  # of an array that a `_Converted` alone refers to, including the argument of `getrefcount`
+_REFERENCES = 2  # to an array that only a `_Converted` holds, including the argument of `getrefcount`
 
 
 def conversion_of(image):

@@ -144,7 +144,7 @@ class Source:
         return means
 
     def _means(self, texels, before):
-        """Return the means of an image without tiles; if texels have changed, other strands keep the means before."""
+        """Return the means of an image without tiles; only strands at changed texels get new means."""
         now = self.pixels[None]
         if before is None or before.texels is not texels:
             return texels.sample({None: self._levels(now)})
@@ -154,7 +154,7 @@ class Source:
         return texels.follow(before.means, self._levels(now), changed)
 
     def _levels(self, values):
-        """Return the `Levels` of an image without tiles, which are kept, and updated when it changes."""
+        """Return the `Levels` of an image without tiles. They are kept, and updated when the image changes."""
         key = self.settings.source, self.is_color
         levels = level_cache.get(key)
         if levels is None or levels.pixels.shape != values.shape:

@@ -80,7 +80,7 @@ def _values(strands, item):
 
 
 def _followed(hair_uid, look, given, randoms):
-    """Return `StrandLooks`; those known of the hair are reused for strands whose values have not changed."""
+    """Return `StrandLooks`; strands whose values have not changed keep their known looks."""
     known = look_cache.get(hair_uid)
     changed = None if known is None else _changed(known, look, given, randoms)
     if changed is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Only changed texels of painted images, and strands at them, are read again: with the same result as all of them."""
+"""Only changed texels of painted images, and strands at these, are read again, with the same result as reading all."""
 
 import bpy
 import numpy as np
@@ -71,7 +71,7 @@ def test_other_color_spaces_and_sizes_convert_all(hair, rng):
 
 
 def test_strokes_reuse_arrays_that_nobody_holds(hair, rng):
-    """Strokes are read into two arrays in turn, but not into arrays that somebody still holds."""
+    """Strokes are read into two arrays in turn, but not into arrays that are still in use."""
     image = bpy.data.images.new("Painted", 24, 40, alpha=True)
     held, kept, places = [], [], []
     for turn in range(8):
