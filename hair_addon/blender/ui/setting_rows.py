@@ -101,11 +101,6 @@ def rows(layout, owner, settings_class, names, style=""):
             row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
 
 
-def all_rows(layout, owner, settings_class):
-    """Draw a row for each setting of a class."""
-    rows(layout, owner, settings_class, others(settings_class))
-
-
 def mesh_rows(layout, owner, settings_class):
     """Draw the rows of cards or tubes; the bones of chains are gray without chains."""
     rows(layout, owner, settings_class, others(settings_class, ("bone_count",)))

@@ -157,11 +157,3 @@ def linear(encoded: np.ndarray) -> np.ndarray:
 def _linear_bytes():
     values = np.arange(256) / 255.0
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)
-
-
-def reduced_size(width: int, height: int) -> tuple[int, int]:
-    """Return (width, height) of the results of `masks` and `colors`."""
-    step = 1
-    while max(height, width) > step * MOST_SIDE:
-        step *= 2
-    return -(-width // step), -(-height // step)

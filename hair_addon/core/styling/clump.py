@@ -11,7 +11,6 @@ The strand follows the curve of these points up to its own length, so that stran
 in clump_trees.py.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -120,14 +119,6 @@ def amounts(settings: Settings) -> list[Any]:
     """
     parts = [level / max(settings.levels - 1, 1) for level in range(settings.levels)]
     return [np.minimum(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]
-
-
-def packed_thickness(strand_density: float, radius: float) -> float:
-    """Return the thickness at which strands of a lock touch; strand_density: per m² of surface; radius: of strands [m].
-
-    Discs cover at most 0.9 of an area.
-    """
-    return min(math.sqrt(strand_density * math.pi * radius**2 / 0.9), 1.0)
 
 
 def tree(settings: Settings) -> TreeSettings:

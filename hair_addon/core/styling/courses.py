@@ -18,7 +18,6 @@ from .base import StyleSettings
 SAMPLES = 64
 MOST_OF_A_STEP = 4  # courses that a step may have
 BITS = 7  # of the row of each course, packed into one integer
-LEAST = 0.1  # smallest factor of a length of waves or turns, which must be positive
 
 # Samples (N,) by (index of the style, name of its setting).
 Courses = Mapping[tuple[int, str], np.ndarray]
