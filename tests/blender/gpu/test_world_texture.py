@@ -273,6 +273,8 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_ble
     other_blender(SLEEP)
     lights.read_world(scene, waits=False)
     assert [is_error for _sentence, is_error in picture_jobs.sentences()] == [False]
+    picture_jobs.try_again()
+    assert len(picture_jobs.running()) == 1
 
 
 def test_a_render_may_wait_for_the_job_of_a_view(scene, monkeypatch, other_blender):

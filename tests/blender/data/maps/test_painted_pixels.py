@@ -57,10 +57,11 @@ def test_strokes_convert_their_rows_alone(hair, rng, monkeypatch, is_color, is_f
 def test_other_color_spaces_and_sizes_convert_all(hair, rng):
     """An image whose color space or size changes is converted as a whole."""
     image = bpy.data.images.new("Painted", 16, 16, alpha=True)
-    image.pixels.foreach_set(rng.random(16 * 16 * 4, np.float32))
+    values = rng.random(16 * 16 * 4, np.float32)
+    image.pixels.foreach_set(values)
     before = image_pixels.read(image, True)[None]
     image.colorspace_settings.name = "Non-Color"
-    image.pixels.foreach_set(rng.random(16 * 16 * 4, np.float32))
+    image.pixels.foreach_set(values)
     found = image_pixels.read(image, True)[None]
     assert not np.array_equal(found, before)
     np.testing.assert_array_equal(found, fresh(image, True))
