@@ -11,7 +11,7 @@ from ...core.geometry import mesh as mesh_math
 from ...core.geometry import strands
 from ...core.geometry.mesh import SurfacePoints
 from ...core.geometry.strands import Strands
-from ...core.grooming import groom, guide_layers, layer_transfer
+from ...core.grooming import following, groom, guide_layers, layer_transfer
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.guide_layers import GuideLayers
 from ..data import scene
@@ -60,13 +60,12 @@ def write(guides: Curves, surface: Surface, before: LayersBefore, roots: Surface
     counts, local = curves.point_counts(guides), curves.read_points(guides)
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
     bare = guide_layers.without_layers(local, counts, normals)
-    indices, weights, apart = _weights(surface, before, roots)
-    layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
+    layers, nearest = _carried(surface, before, roots, bare)
     layer_attributes.write(guides, layers, layer_items.identities_of(guides.vellus))
     guides.vellus.is_base_grown = True
     recording.note_shown(guides, before.depsgraph)
     recording.show(guides, guide_layers.composed(recording.read(guides, before.depsgraph)))
-    gathered = None if before.gathered is None else before.gathered[np.maximum(indices[:, 0], 0)]
+    gathered = None if before.gathered is None else before.gathered[nearest]
     gathered_groups.write(guides, gathered)
 
 
@@ -75,7 +74,7 @@ def between(surface: Surface, before: LayersBefore, roots: SurfacePoints, base: 
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
     counts = np.full(len(base), base.shape[1], np.int32)
     bare = guide_layers.without_layers(base.reshape(-1, 3), counts, normals)
-    return layer_transfer.transferred(before.layers, bare, *_weights(surface, before, roots))
+    return _carried(surface, before, roots, bare)[0]
 
 
 def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLayers]) -> None:
@@ -93,15 +92,20 @@ def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLaye
     recording.show_layers(guides, joined)
 
 
-def _weights(surface, before, roots):
-    """Return guides (M, k) that new guides follow, their weights, and relative distances (M,) of the first."""
+def _carried(surface, before, roots, bare):
+    """Return (guides `bare` (M) at `roots` with the layers of the guides around them, the nearest guides (M,)).
+
+    Gathered guides are at means of points, as hair between them is.
+    """
     own = before.guides.roots
     if own.is_same(roots):
         indices = np.arange(len(roots), dtype=np.int32)[:, None]
-        return indices, np.ones(indices.shape), np.zeros(len(roots))
+        weights, apart = np.ones(indices.shape), np.zeros(len(roots))
+        return layer_transfer.transferred(before.layers, bare, indices, weights, apart), indices[:, 0]
+    guides = strands.from_numpy(before.guides.numpy(), own, "cpu")
     binding = groom.bind_hair(
         surface.mesh,
-        strands.from_numpy(before.guides.numpy(), own, "cpu"),
+        guides,
         before.settings,
         regions=before.parting.regions,
         lines=before.parting.lines,
@@ -110,6 +114,14 @@ def _weights(surface, before, roots):
         is_mirrored=surface.has_flipped_winding,
     )
     indices, weights = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
-    first = mesh_math.positions(surface.mesh, own)[np.maximum(indices[:, 0], 0)]
+    nearest = np.maximum(indices[:, 0], 0)
+    first = mesh_math.positions(surface.mesh, own)[nearest]
     apart = np.linalg.norm(first - mesh_math.positions(surface.mesh, roots), axis=1)
-    return indices, weights, apart / (surface.extent * surface.scale)
+    apart /= surface.extent * surface.scale
+    layers = layer_transfer.transferred(before.layers, bare, indices, weights, apart)
+    is_between = apart > layer_transfer.SAME_PLACE
+    is_gathered = is_between & (before.gathered is not None and before.gathered.groups[nearest] > 0)
+    if is_gathered.any() and (layers.counts == guides.point_count).all():
+        means = surface.to_local(following.follow_guides(binding, guides).numpy())
+        layers = layer_transfer.at_points(layers, means.reshape(-1, 3), is_gathered)
+    return layers, nearest

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from .. import geometry
-from .guide_layers import GuideLayers, added
+from .guide_layers import GuideLayers, added, recorded
 from .guide_shapes import rotations
 
-_SAME_PLACE = 1e-6  # of the extent of the roots: guides at a smaller distance are the same
+SAME_PLACE = 1e-6  # of the extent of the roots: guides at a smaller distance are the same
 _OF_GUIDES, _OF_LAYERS = ("base", "counts", "normals", "tangents"), ("turns", "stretches", "weights")
 
 
@@ -36,7 +36,7 @@ def transferred(
     indices = np.maximum(indices, 0)
     is_same = np.zeros(len(indices), bool)
     if apart is not None:
-        is_same = (apart <= _SAME_PLACE) & (np.asarray(layers.counts)[indices[:, 0]] == others.counts)
+        is_same = (apart <= SAME_PLACE) & (np.asarray(layers.counts)[indices[:, 0]] == others.counts)
         weights[is_same] = 0.0
         weights[is_same, 0] = 1.0
     found = others
@@ -76,6 +76,23 @@ def transferred(
         layers.normals[indices[is_same, 0]],
     )
     return found
+
+
+def at_points(layers: GuideLayers, points: np.ndarray, is_chosen: np.ndarray) -> GuideLayers:
+    """Return layers whose chosen guides (G,) have points (N, 3); the layer that turns a guide most has the difference.
+
+    Roots do not move. A mean of turns is far from the mean of points where guides turn by more than half a circle, as
+    those do that are wound around a tie.
+    """
+    turning = 2.0 * np.arctan2(np.linalg.norm(layers.turns[..., 1:], axis=-1), np.abs(layers.turns[..., 0]))
+    starts = geometry.strands.curve_offsets(layers.counts)
+    points = np.array(points, np.float32)
+    points[starts[:-1]] = layers.base[starts[:-1]]
+    of_guides = layers.weights * np.add.reduceat(turning, starts[:-1], axis=1)
+    for layer in range(len(layers.turns)):
+        is_own = is_chosen & (of_guides.argmax(axis=0) == layer)
+        layers = recorded(layers, layer, points, is_edited=is_own)[0]
+    return layers
 
 
 def chosen_guides(layers: GuideLayers, kept: np.ndarray) -> GuideLayers:

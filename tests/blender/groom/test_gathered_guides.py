@@ -253,16 +253,23 @@ def test_added_and_mirrored_guides_are_in_groups(guides):
     assert (groups_of(guides) == 1).all()
 
 
-def test_guides_that_are_added_to_layers_are_in_the_bun(guides):
+@pytest.mark.parametrize("is_grown_again", [False, True])
+def test_new_guides_of_layers_are_in_the_bun(guides, is_grown_again):
     """Means of turns by whole circles would leave the bun."""
     api.add_layer(guides)
     add_line()
     gather(guides, shape="BUN")
     before = points(guides)
-    api.change_guides(guides, "COUNT", factor=3.0)
+    if is_grown_again:
+        guides.data.vellus.guides.guide_count = 180
+        new = slice(None)
+    else:
+        api.change_guides(guides, "COUNT", factor=3.0)
+        new = slice(len(before), None)
     bpy.context.view_layer.update()
-    assert np.array_equal(points(guides)[: len(before)], before)
-    ends = points(guides)[len(before) :, -12:] - np.array(LINE[0])
+    after = points(guides)
+    assert len(after) == 180 and (is_grown_again or np.array_equal(after[: len(before)], before))
+    ends = after[new, -12:] - np.array(LINE[0])
     assert np.median(np.linalg.norm(ends, axis=2).max(axis=1)) < 1.5 * SIZES["bun_radius"]
 
 

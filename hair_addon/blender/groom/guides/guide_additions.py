@@ -17,8 +17,8 @@ from ....core.grooming.groom import POINT_COUNT, HairSettings
 from ....core.grooming.guide_layers import GuideLayers
 from ....core.grooming.guide_tool_settings import CountSettings, MirrorSettings
 from ...data import masks
-from ...data.strands import attributes, curves, gathered_groups, guide_curves, partings
-from ...layers import carried_layers, recording
+from ...data.strands import curves, gathered_groups, guide_curves, partings
+from ...layers import carried_layers
 from ...layers.carried_layers import LayersBefore
 from ...settings import preferences
 from .. import pipeline
@@ -46,29 +46,10 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
             bare = replace(guides, points=guides.surface.from_local(before.layers.base))
             base = guides.surface.to_local(_between(bare, roots, depsgraph)[0])
             layers = [carried_layers.between(guides.surface, before, roots, base)]
-        points, nearest = _between(guides, roots, depsgraph)
-        write(guides, [(points, nearest, roots)], np.zeros(0, np.int64), before, layers)
-        if before is not None:
-            _comb_gathered(datablock, guides.surface.to_local(points), depsgraph)
+        write(guides, [(*_between(guides, roots, depsgraph), roots)], np.zeros(0, np.int64), before, layers)
     elif difference < 0:
         write(guides, [], _crowded(guides, -difference, depsgraph), before)
     return len(datablock.curves)
-
-
-def _comb_gathered(datablock, points, depsgraph):
-    """Comb the gathered guides among the last M to points (M, P, 3) in local coordinates, in the active layer.
-
-    Layers average turns. Guides around a tie or along a row turn by more than half a circle, and means of such turns
-    are far from means of points.
-    """
-    groups, local = gathered_groups.groups_of(datablock), curves.read_points(datablock)
-    if groups is None:
-        return
-    is_gathered = groups[len(groups) - len(points) :] > 0
-    last = local[len(local) - points.shape[0] * points.shape[1] :].reshape(points.shape)
-    last[is_gathered] = points[is_gathered]
-    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", local)
-    recording.update(datablock, depsgraph)
 
 
 def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) -> int:
