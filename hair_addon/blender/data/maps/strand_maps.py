@@ -4,6 +4,7 @@
 One function computes the arrays, which the hair's Curves store for viewports and renders.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +110,7 @@ def _changed(known, look, given, randoms):
 
 
 def _bits(values):
-    return np.ascontiguousarray(values).view(f"i{values.itemsize}").reshape(len(values), -1)
+    return np.ascontiguousarray(values).view(f"i{values.itemsize}").reshape(len(values), math.prod(values.shape[1:]))
 
 
 def _looks(look, given, randoms):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Only changed texels of painted images, and strands at these, are read again, with the same result as reading all."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -132,3 +134,13 @@ def test_strokes_change_their_strands_as_a_new_reading_does(hair, rng, monkeypat
             for module, name in CACHES:
                 anew.setattr(module, name, Cache())
             assert looks.is_same(strand_maps.looks_of(hair.data)[0])
+
+
+def test_hair_without_strands_has_no_looks(hair):
+    """Hair that has lost all its strands has looks of no strands, also when they are read again."""
+    map_items.keep(hair.data.vellus, MapSettings(setting="look.roughness", kind="STRAND"))
+    strands = sources.stored_strands(hair.data)
+    none = replace(strands, roots=None, identities=strands.identities[:0], randoms=strands.randoms[:0])
+    for _reading in range(2):
+        looks, errors = strand_maps.looks_of(hair.data, none)
+        assert len(looks) == 0 and errors == []
