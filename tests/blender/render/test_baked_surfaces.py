@@ -237,6 +237,19 @@ def test_files_in_use_are_kept(tmp_path, monkeypatch):
     assert sorted(tmp_path.iterdir()) == [files[0], files[2], files[3]]
 
 
+def test_folders_of_killed_jobs_are_removed_after_a_day(tmp_path):
+    """A new job removes the folders that former jobs left behind when Blender was killed, not those of other jobs."""
+    old, recent, other = tmp_path / ".old", tmp_path / ".recent", tmp_path / "kept.npz"
+    for folder in (old, recent):
+        folder.mkdir()
+        (folder / "owners.blend").touch()
+    other.touch()
+    for each in (old, other):
+        os.utime(each, (0.0, 0.0))
+    made = kept_files.new_job(tmp_path)
+    assert sorted(tmp_path.iterdir()) == sorted([made, recent, other])
+
+
 def test_a_view_keeps_plain_colors_until_nodes_are_baked(stage, monkeypatch):
     """A view starts one job for all surfaces. Until it ends, and after an error, the view has plain colors and a
     sentence.

@@ -2,7 +2,9 @@
 """Files that are made once and kept: in the extension's user folder, or until Blender quits."""
 
 import os
+import shutil
 import tempfile
+import time
 from pathlib import Path
 
 import bpy
@@ -10,6 +12,7 @@ import bpy
 from ...settings import preferences
 
 _MOST_KEPT = 64  # files
+_ABANDONED = 86400.0  # [s] after which the folder of a job has no process
 
 
 def folder(name):
@@ -29,6 +32,14 @@ def remove_oldest(path, used=frozenset()):
     files = [file for file in path.parent.glob(f"*{path.suffix}") if file not in used]
     for file in sorted(files, key=_time_of)[:-_MOST_KEPT]:
         file.unlink(missing_ok=True)
+
+
+def new_job(folder):
+    """Return a new folder in a folder of files, and remove those of jobs whose processes were killed long ago."""
+    for job in folder.glob(".*"):
+        if job.is_dir() and time.time() - _time_of(job) > _ABANDONED:
+            shutil.rmtree(job, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=".", dir=folder))
 
 
 def _time_of(file):

@@ -2,10 +2,8 @@
 """Pictures of worlds, lights and surfaces that a background process makes with Cycles, and their files."""
 
 import shutil
-import tempfile
 import threading
 import weakref
-from pathlib import Path
 
 import bpy
 
@@ -54,8 +52,7 @@ class PictureJob:
         sources = [(library_of(one), one.name) for one in owners.values()]
         try:
             # Beside the files, because a file cannot be renamed to another file system.
-            parent = next(iter(owners)).parent
-            folder = Path(tempfile.mkdtemp(prefix=".", dir=parent))
+            folder = kept_files.new_job(next(iter(owners)).parent)
             self._remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
             local = {one for one in owners.values() if one.library is None}  # the others are read from their libraries
             blend = folder / BLEND
