@@ -41,13 +41,13 @@ def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | No
     floats = (np.ascontiguousarray(pixels, np.float32).reshape(len(pixels), -1) for pixels in (before, now))
     word = np.int64 if now.shape[2] % 2 == 0 else np.int32
     bits = [values.view(word) for values in floats]
-    rows = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
+    is_changed = bits[0] != bits[1]
+    rows = np.flatnonzero(is_changed.any(axis=1))
     if not len(rows):
         return None
     changed = slice(int(rows[0]), int(rows[-1]) + 1)
-    texels = np.flatnonzero((bits[0][changed] != bits[1][changed]).any(axis=0)) // (
-        now.shape[2] * 4 // np.dtype(word).itemsize
-    )
+    words_per_texel = now.shape[2] * 4 // np.dtype(word).itemsize
+    texels = np.flatnonzero(is_changed[changed].any(axis=0)) // words_per_texel
     return changed, slice(int(texels[0]), int(texels[-1]) + 1)
 
 

@@ -31,8 +31,8 @@ def points(curves, surface, is_complete=False):
     found = surface.swap_winding(SurfacePoints(triangle, barycentric))
     vertices = _vertices(curves)
     if vertices is not None:
-        are_vertices = ((vertices >= 0) & (vertices < len(surface.rest))).all(axis=1)
-        is_other = (vertices != surface.root_vertices(found)).any(axis=1)
+        are_vertices = _all((vertices >= 0) & (vertices < len(surface.rest)))
+        is_other = ~_all(vertices == surface.root_vertices(found))
         cut_otherwise = np.flatnonzero(known & is_other & are_vertices)
         known &= are_vertices
         if len(cut_otherwise):
@@ -151,9 +151,16 @@ def may_start_off_surface(curves):
 
 def are_barycentric(coordinates):
     """Return (S,) bool: whether rows of (S, 3) are inside a triangle up to rounding; False for NaN."""
-    is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
+    is_inside = _all((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3))
     with np.errstate(over="ignore", invalid="ignore"):
-        return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
+        first, second, third = coordinates.T
+        return is_inside & (abs(first + second + third - 1.0) < 1e-3)
+
+
+def _all(truths):
+    """Return (S,) bool: whether all of (S, 3) are true. NumPy's reduction along short rows takes ten times as long."""
+    first, second, third = truths.T
+    return first & second & third
 
 
 def _vertices(curves):
