@@ -121,6 +121,17 @@ def test_buns_of_few_points_and_of_any_turns_stay_in_their_ball(ball, count, tur
     assert np.linalg.norm(after[:, 2:] - TIE, axis=2).max(initial=0.0) < 1.5 * BUN.bun_radius
 
 
+def test_turns_of_a_bun_have_points_enough(ball):
+    """Segments between too few points would cut through the bun as the sides of a star do."""
+    after, _groups, _held = gathered(ball, guides_on(40), [TAIL], replace(BUN, turns=12.0))
+    up = TIE / RADIUS
+    coiled = after[:, -IN_BUN + 8 :].astype(np.float64) - TIE
+    middles = 0.5 * (coiled[:, 1:] + coiled[:, :-1])
+    beside = [np.linalg.norm(places - (places @ up)[..., None] * up, axis=2) for places in (coiled, middles)]
+    ratios = beside[1] / np.minimum(beside[0][:, 1:], beside[0][:, :-1])
+    assert ratios.min() > 0.75
+
+
 def test_symmetric_guides_stay_symmetric(ball):
     """Symmetric guides stay symmetric, up to the asymmetry of the mesh's triangles."""
     after, _groups, _held = gathered(ball, guides_on(80), [TAIL], SETTINGS)

@@ -6,7 +6,7 @@ mean of guides at different places of a coil would be shorter than the coil, and
 mean length of their guides, would leave it. Guides become as long as the coil, and their ends are tucked in below it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _INWARD = 0.5  # radius of the bun where the coil ends, relative to its edge
 _END = 0.45  # radius of the coil's end relative to the coil
 _ON_WAY = 0.25  # share of a guide's segments on its way to the tie
 _STRAIGHT = 0.3  # curvature relative to the median, below which the distance of points stays
+_OF_TURN = 6  # least number of segments in a turn
 _RISING, _COILED, _TUCKING = 60, 2000, 200  # points of the parts of the line
 
 
@@ -61,6 +62,11 @@ def segment_counts(count: int) -> tuple[int, int]:
     """Return how many of a guide's segments are on its way to the tie, and how many in the bun."""
     on_way = max(1, round(_ON_WAY * count))
     return on_way, count - on_way
+
+
+def with_points_enough(settings: GatherSettings, segments: int) -> GatherSettings:
+    """Return settings with at most as many turns as a number of segments in the bun can follow."""
+    return replace(settings, turns=min(settings.turns, max(segments, 1) / _OF_TURN))
 
 
 def wound(mesh: TriMesh, query: SurfaceQuery, line: np.ndarray, settings: GatherSettings) -> Bun:

@@ -112,9 +112,9 @@ def _along(points, ways):
 def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
     """Return the result of `_at_line` for a bun: guides that reach the tie become as long as the coil."""
     ways, ranks = ways_and_ranks
-    bun = buns.wound(mesh, query, line, settings)
-    normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
     on_way, coiled = buns.segment_counts(points.shape[1] - 1)
+    bun = buns.wound(mesh, query, line, buns.with_points_enough(settings, coiled))
+    normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
     wound = bun.points(_angles(ways, bun.line, normal), ranks, coiled + 1)
     ways = np.concatenate([ways, wound[:, :1]], axis=1)
     after = _along(points, ways)
