@@ -18,6 +18,7 @@ from hair_addon.blender.data.pictures import (
     unread_nodes,
 )
 from hair_addon.blender.host import background_process, cli_command
+from hair_addon.blender.io.pictures import surface_bake
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.pictures.rendering import add_orthographic_camera
@@ -219,6 +220,22 @@ def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
     np.testing.assert_allclose(again.pop(painted.session_uid), [(0.3, 0.1, 0.2)], atol=1e-3)
     assert all(np.allclose(again[uid], found[uid]) for uid in again)
     assert baked == [5, 4]
+
+
+def test_unsaved_pixels_are_of_the_local_image(stage, tmp_path):
+    """Unsaved pixels are restored in the local object's image, not in an image of a library with the same name."""
+    files = [tmp_path / "library.blend", tmp_path / "owners.blend"]
+    for side, file in zip((2, 4), files, strict=True):
+        material, tree, shader = new_tree("Skin")
+        texture = node(tree, "ShaderNodeTexImage", shader.inputs["Base Color"], coordinates=False)
+        texture.image = bpy.data.images.new("Skin", side, side)
+        placed = wall(material)
+        placed.name = file.stem
+        bpy.data.libraries.write(str(file), {placed})
+        bpy.data.batch_remove([placed, material, texture.image])
+    objects = surface_bake._loaded(files[1], [(str(files[0]), "library"), ("", "owners")])
+    assert [one.name for one in objects] == ["library", "owners"]
+    assert tuple(bpy.data.images["Skin"].size) == (4, 4)
 
 
 def test_files_in_use_are_kept(tmp_path, monkeypatch):

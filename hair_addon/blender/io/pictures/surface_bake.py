@@ -78,10 +78,11 @@ def bake(path, sources, frame, for_render, is_coarse, out):
 def _loaded(path, sources):
     """Return the object of each source, None if its file does not contain it.
 
-    Linked objects are read from their libraries, as a .blend contains only links to them.
+    Linked objects are read from their libraries, as a .blend contains only links to them; local objects first, so that
+    their images keep their names for `unsaved_images`.
     """
     found = [None] * len(sources)
-    for file in dict.fromkeys(library for library, _name in sources):
+    for file in sorted({library for library, _name in sources}):
         places = [index for index, (library, _name) in enumerate(sources) if library == file]
         with bpy.data.libraries.load(file or str(path)) as (_names, wanted):
             wanted.objects = [sources[index][1] for index in places]
