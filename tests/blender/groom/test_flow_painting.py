@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paint Flow turns guides along strokes on the surface as it is posed, and keeps them outside of it."""
 
+from functools import partial
 from types import SimpleNamespace
 
 import bpy
@@ -210,10 +211,15 @@ def test_the_brush_fits_the_surface_until_its_radius_is_set(guides):
 
 
 def test_the_circle_stays_while_its_radius_changes(guides, monkeypatch):
-    """F keeps the circle where it began and returns the mouse there, whether the change is kept or canceled."""
+    """F keeps the circle where it began and returns the mouse there, whether the change is kept or canceled.
+
+    Until the radius is set, also after Esc, it fits the surface.
+    """
     drawn, warps = [], []
     monkeypatch.setattr(brush_circle, "circle", lambda _context, _guides, _brush, mouse: drawn.append(mouse))
-    brush = SimpleNamespace(radius=0.5)
+    brush = bpy.context.window_manager.operator_properties_last("vellus.paint_flow")
+    brush.property_unset("radius")
+    fitted = brush.radius
     tool = SimpleNamespace(idname=tools.PAINT_FLOW, operator_properties=lambda _name: brush)
     context = SimpleNamespace(
         region=SimpleNamespace(x=20, y=10),
@@ -230,16 +236,20 @@ def test_the_circle_stays_while_its_radius_changes(guides, monkeypatch):
     def event(kind, x, value="PRESS"):
         return SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=100)
 
-    for last, radius in (("LEFTMOUSE", 1.0), ("ESC", 1.0)):
-        operator = SimpleNamespace(setting="radius")
-        operator._end = lambda *given, me=operator: VELLUS_OT_size_flow_brush._end(me, *given)
+    for last, factor in (("ESC", 1.0), ("LEFTMOUSE", 2.0), ("ESC", 2.0)):
+        operator, is_set = SimpleNamespace(setting="radius"), brush.is_property_set("radius")
+        for name in ("_end", "_restore"):
+            setattr(operator, name, partial(getattr(VELLUS_OT_size_flow_brush, name), operator))
         VELLUS_OT_size_flow_brush.invoke(operator, context, event("F", 200))
         VELLUS_OT_size_flow_brush.modal(operator, context, event("MOUSEMOVE", 350, "NOTHING"))
         brush_circle.draw(context, brush, (350, 100))
         VELLUS_OT_size_flow_brush.modal(operator, context, event(last, 350))
-        assert drawn.pop() == (180, 90) and warps.pop() == (200, 100) and brush.radius == radius
+        assert drawn.pop() == (180, 90) and warps.pop() == (200, 100)
+        assert brush.radius == pytest.approx(factor * fitted)
+        assert brush.is_property_set("radius") == (is_set or last == "LEFTMOUSE")
         brush_circle.draw(context, brush, (350, 100))
         assert drawn.pop() == (330, 90)
+    brush.property_unset("radius")
 
 
 def test_the_circle_is_drawn_where_the_view_shows_it():

@@ -124,6 +124,7 @@ class VELLUS_OT_size_flow_brush(bpy.types.Operator):
         """Begin with the present value."""
         brush = _active_tool(context).operator_properties(_TOOL)
         self._brush, self._before, self._start = brush, getattr(brush, self.setting), (event.mouse_x, event.mouse_y)
+        self._was_set = brush.is_property_set(self.setting)
         brush_circle.hold(self._start)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -131,9 +132,10 @@ class VELLUS_OT_size_flow_brush(bpy.types.Operator):
     def modal(self, context, event):
         """Change the value while the mouse moves; Esc and the right button restore it."""
         if event.type in {"ESC", "RIGHTMOUSE"}:
-            return self._end(context, self._before, {"CANCELLED"})
+            self._restore()
+            return self._end(context, {"CANCELLED"})
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"} and event.value == "PRESS":
-            return self._end(context, getattr(self._brush, self.setting), {"FINISHED"})
+            return self._end(context, {"FINISHED"})
         if event.type == "MOUSEMOVE":
             moved = (event.mouse_x - self._start[0]) / context.preferences.system.ui_scale
             is_radius = self.setting == "radius"
@@ -145,12 +147,18 @@ class VELLUS_OT_size_flow_brush(bpy.types.Operator):
     def cancel(self, _context):
         """Restore the value when the window is closed."""
         brush_circle.hold(None)
-        setattr(self._brush, self.setting, self._before)
+        self._restore()
 
-    def _end(self, context, value, result):
+    def _restore(self):
+        """Restore the value; a radius that was not set fits the surface again."""
+        if self._was_set:
+            setattr(self._brush, self.setting, self._before)
+        else:
+            self._brush.property_unset(self.setting)
+
+    def _end(self, context, result):
         brush_circle.hold(None)
         context.window.cursor_warp(*self._start)  # back to the circle
-        setattr(self._brush, self.setting, value)
         context.area.tag_redraw()
         return result
 
