@@ -73,14 +73,19 @@ def _update_status(guides, blender_scene, points, time):
     """Update the status of guides shown at `points`: errors of settings or a baked frame, if any."""
     try:
         _note_state(guides, blender_scene)
-        fault = frame_folders.fault_of(guides, sorted({math.floor(time), math.ceil(time)}))
-        if fault is not None:
-            raise fault
+        _require_readable(guides, time)
         is_known = frame_folders.has_frames(guides) or played_cache.get(guides.session_uid) is not None
         if points is not None or is_known:
             guides.vellus.dynamics_status = dynamics_state.map_status_of(guides)
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
+
+
+def _require_readable(guides, time):
+    """Raise a `HairError` if a baked frame of guides at a time is damaged."""
+    fault = frame_folders.fault_of(guides, sorted({math.floor(time), math.ceil(time)}))
+    if fault is not None:
+        raise fault
 
 
 def follow_settings(blender_scene, depsgraph):
@@ -112,6 +117,7 @@ def follow_undo(blender_scene, depsgraph):
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
             _note_state(guides, blender_scene)
+            _require_readable(guides, scene_time.time_of(blender_scene))
         except HairError as error:
             guides.vellus.dynamics_status = str(error)
 

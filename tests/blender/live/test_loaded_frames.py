@@ -42,3 +42,12 @@ def test_baked_frames_are_shown_after_loading(baked, tmp_path, is_combed):
     assert simulated_guides.is_shown(hair.vellus.guide_curves)
     loaded = hair_cache.strands_on_gpu(hair).points
     np.testing.assert_allclose(loaded, shown, atol=1e-5)
+
+
+def test_a_damaged_frame_is_a_status_after_loading(baked, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "baked.blend"))
+    (frame,) = (tmp_path / "frames").rglob("+*3.npz")
+    frame.write_bytes(frame.read_bytes()[:50])
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
+    guides = bpy.data.objects["Guides"].data
+    assert not simulated_guides.is_shown(guides) and "Frame 3" in guides.vellus.dynamics_status
