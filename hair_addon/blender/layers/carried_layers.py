@@ -93,9 +93,9 @@ def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLaye
 
 
 def _carried(surface, before, roots, bare):
-    """Return (guides `bare` (M) at `roots` with the layers of the guides around them, the nearest guides (M,)).
+    """Return (layers of guides `bare` at M roots, taken from the guides around them; the nearest guides (M,)).
 
-    Gathered guides are at means of points, as hair between them is.
+    Gathered guides are at means of points, like the hair between them.
     """
     own = before.guides.roots
     if own.is_same(roots):

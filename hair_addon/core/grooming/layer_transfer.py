@@ -79,10 +79,11 @@ def transferred(
 
 
 def at_points(layers: GuideLayers, points: np.ndarray, is_chosen: np.ndarray) -> GuideLayers:
-    """Return layers whose chosen guides (G,) have points (N, 3); the layer that turns a guide most has the difference.
+    """Return layers that give chosen guides (G,) points (N, 3); the layer that turns a guide most stores the
+    difference.
 
-    Roots do not move. A mean of turns is far from the mean of points where guides turn by more than half a circle, as
-    those do that are wound around a tie.
+    Roots do not move. Where guides turn by more than half a circle, as around a tie, means of turns are far from means
+    of points.
     """
     turning = 2.0 * np.arctan2(np.linalg.norm(layers.turns[..., 1:], axis=-1), np.abs(layers.turns[..., 0]))
     starts = geometry.strands.curve_offsets(layers.counts)

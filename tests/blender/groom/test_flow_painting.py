@@ -213,7 +213,7 @@ def test_the_brush_fits_the_surface_until_its_radius_is_set(guides):
 def test_the_circle_stays_while_its_radius_changes(guides, monkeypatch):
     """F keeps the circle where it began and returns the mouse there, whether the change is kept or canceled.
 
-    Until the radius is set, also after Esc, it fits the surface.
+    The radius fits the surface until it is set, also after Esc.
     """
     drawn, warps = [], []
     monkeypatch.setattr(brush_circle, "circle", lambda _context, _guides, _brush, mouse: drawn.append(mouse))

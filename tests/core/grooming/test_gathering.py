@@ -122,7 +122,7 @@ def test_buns_of_few_points_and_of_any_turns_stay_in_their_ball(ball, count, tur
 
 
 def test_turns_of_a_bun_have_points_enough(ball):
-    """Segments between too few points would cut through the bun as the sides of a star do."""
+    """Segments between too few points would cut through the bun like the sides of a star."""
     after, _groups, _held = gathered(ball, guides_on(40), [TAIL], replace(BUN, turns=12.0))
     up = TIE / RADIUS
     coiled = after[:, -IN_BUN + 8 :].astype(np.float64) - TIE

@@ -12,7 +12,7 @@ import bpy
 from ...settings import preferences
 
 _MOST_KEPT = 64  # files
-_ABANDONED = 86400.0  # [s] after which the folder of a job has no process
+_ABANDONED = 86400.0  # age [s] of the folder of a job that was killed
 
 
 def folder(name):
@@ -35,7 +35,7 @@ def remove_oldest(path, used=frozenset()):
 
 
 def new_job(folder):
-    """Return a new folder in a folder of files, and remove those of jobs whose processes were killed long ago."""
+    """Return a new folder of a job in a folder of files, and remove those of jobs that were killed long ago."""
     for job in folder.glob(".*"):
         if job.is_dir() and time.time() - _time_of(job) > _ABANDONED:
             shutil.rmtree(job, ignore_errors=True)

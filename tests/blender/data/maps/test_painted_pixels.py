@@ -137,7 +137,7 @@ def test_strokes_change_their_strands_as_a_new_reading_does(hair, rng, monkeypat
 
 
 def test_hair_without_strands_has_no_looks(hair):
-    """Hair that has lost all its strands has looks of no strands, also when they are read again."""
+    """Hair without strands has empty looks, also when they are read again."""
     map_items.keep(hair.data.vellus, MapSettings(setting="look.roughness", kind="STRAND"))
     strands = sources.stored_strands(hair.data)
     none = replace(strands, roots=None, identities=strands.identities[:0], randoms=strands.randoms[:0])
