@@ -2,6 +2,7 @@
 """World light has the image's radiance as in Cycles, and arrives among strands and on surfaces."""
 
 import math
+import os
 import sys
 import tempfile
 import time
@@ -275,6 +276,28 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_ble
     assert [is_error for _sentence, is_error in picture_jobs.sentences()] == [False]
     picture_jobs.try_again()
     assert len(picture_jobs.running()) == 1
+
+
+def test_coarse_and_old_pictures_of_a_view_are_removed(scene, tmp_path, monkeypatch, other_blender):
+    """A fine picture replaces the coarse one of a view, and of more pictures than a maximum the oldest are removed."""
+    mixed_world(scene)[0].default_value = (0.41, 0.0, 0.0)
+    sent = []
+    monkeypatch.setattr(background_process._Process, "send", lambda _self, folder: sent.append(folder))
+    monkeypatch.setattr(kept_files, "folder", lambda _name: tmp_path)
+    monkeypatch.setattr(kept_files, "_MOST_KEPT", 1)
+    other_blender(SLEEP)
+    for age in (100, 200):
+        (tmp_path / f"{age}.exr").touch()
+        os.utime(tmp_path / f"{age}.exr", (age, age))
+    shown = [world_panoramas.file_of(scene.world, 1.0, waits=False)]
+    for _picture in ("coarse", "fine"):
+        (sent[-1] / "0.exr").touch()
+        (sent[-1] / background_process.ENDED).touch()
+        picture_jobs.look()
+        shown.append(world_panoramas.file_of(scene.world, 1.0, waits=False))
+    fine = tmp_path / f"{world_digest.digest_of(scene.world)}.exr"
+    assert shown == [None, fine.with_suffix(".coarse.exr"), fine]
+    assert sorted(tmp_path.iterdir()) == sorted([tmp_path / "200.exr", fine])
 
 
 def test_a_render_may_wait_for_the_job_of_a_view(scene, monkeypatch, other_blender):

@@ -165,7 +165,7 @@ def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
     monkeypatch.setattr(
         picture_jobs.PictureJob,
         "__init__",
-        lambda self, kind, objects, values: (baked.append(len(objects)), start(self, kind, objects, values))[1],
+        lambda self, kind, objects, *given: (baked.append(len(objects)), start(self, kind, objects, *given))[1],
     )
     (red, value), (blue, _value), (gray, factor) = (
         plain_color(name, color)

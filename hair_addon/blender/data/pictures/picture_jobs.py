@@ -42,12 +42,13 @@ _SENTENCES = {
 class PictureJob:
     """Files of pictures that the background process makes.
 
-    owners: {path of a file: original world, light or object that it shows}; values: arguments of this kind of job.
-    reasons: {path: why the file cannot be made}.
+    owners: {path of a file: original world, light or object that it shows}; used: set of paths of files in use, which
+    stay; values: arguments of this kind of job. reasons: {path: why the file cannot be made}.
     """
 
-    def __init__(self, kind, owners, values):
-        self.kind, self.reasons, self._names = kind, {}, {path: name_of(one) for path, one in owners.items()}
+    def __init__(self, kind, owners, used, values):
+        self.kind, self.reasons, self._used = kind, {}, used
+        self._names = {path: name_of(one) for path, one in owners.items()}
         self._lock = threading.Lock()
         sources = [(library_of(one), one.name) for one in owners.values()]
         try:
@@ -97,6 +98,9 @@ class PictureJob:
                 refusal = made.with_suffix(".txt")
                 told = refusal.read_text("utf-8") if refusal.is_file() else complaint
                 self.reasons[path] = told or cause_of(error)
+                continue
+            _coarse(path).unlink(missing_ok=True)
+            kept_files.remove_oldest(path, self._used.union(last_cache.values()))
         self._drop.detach()
         self._remove()
 
@@ -147,7 +151,7 @@ def _make(kind, owners, waits, used, values):
     missing = {path: one for path, one in owners.items() if not path.is_file()}
     new = {path: one for path, one in missing.items() if not _is_known(path)}
     if new and (waits or not any(job.kind == kind for job in running())):
-        job = PictureJob(kind, new, values)
+        job = PictureJob(kind, new, used, values)
         for path in new:
             job_cache.keep(path, job)
     jobs = {path: job_cache.get(path) for path in missing}
@@ -155,9 +159,6 @@ def _make(kind, owners, waits, used, values):
         job.is_ended(waits)
     if missing and not waits and running() and not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=_LOOK, persistent=True)
-    for path in [path for path in missing if path.is_file()]:
-        _coarse(path).unlink(missing_ok=True)
-        kept_files.remove_oldest(path, used)
     return [job.error(path) for path, job in jobs.items() if job is not None and path in job.reasons]
 
 
