@@ -279,7 +279,7 @@ def test_a_view_shows_other_nodes_once_cycles_has_rendered_them(scene, other_ble
 
 
 def test_coarse_and_old_pictures_of_a_view_are_removed(scene, tmp_path, monkeypatch, other_blender):
-    """A fine picture replaces the coarse one of a view, and of more pictures than a maximum the oldest are removed."""
+    """A fine picture replaces the coarse one of a view, and the oldest pictures beyond the maximum are removed."""
     mixed_world(scene)[0].default_value = (0.41, 0.0, 0.0)
     sent = []
     monkeypatch.setattr(background_process._Process, "send", lambda _self, folder: sent.append(folder))

@@ -43,7 +43,7 @@ class PictureJob:
     """Files of pictures that the background process makes.
 
     owners: {path of a file: original world, light or object that it shows}; used: set of paths of files in use, which
-    stay; values: arguments of this kind of job. reasons: {path: why the file cannot be made}.
+    are not removed; values: arguments of this kind of job. reasons: {path: why the file cannot be made}.
     """
 
     def __init__(self, kind, owners, used, values):
