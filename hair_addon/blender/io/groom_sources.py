@@ -58,18 +58,23 @@ def all_hair():
 
 
 def sources_of(chosen, settings, per_meter):
-    """Return the `Source`s of the guides and strands of each hair; IDs are unique in the file."""
+    """Return the `Source`s of the guides and strands of each hair; IDs are unique in the file.
+
+    Guides and hair without curves are left out. Raises `HairError` if all hair is without strands.
+    """
     names, sources, first_id = group_names(chosen), [], 0
     for group, (hair, name) in enumerate(zip(chosen, names, strict=True)):
         guides = hair.vellus.guide_curves
-        if settings.has_guides and guides is not None:
+        if settings.has_guides and guides is not None and len(guides.curves):
             made = _guide_curves(guides, group, name, first_id, per_meter)
             sources.append(Source(Remembered(guides), made, settings.moves(True)))
-        if settings.has_hair:
+        if settings.has_hair and len(hair.curves):
             shown = modified_strands.curves_of(hair)
             made = _strand_curves(hair, shown or hair, group, name, first_id, per_meter, settings)
             sources.append(Source(Remembered(hair), made, settings.moves(False), shown not in (None, hair)))
         first_id += (len(guides.curves) if guides is not None else 0) + len(hair.curves)
+    if settings.has_hair and chosen and not sources:
+        raise HairError('"{name}" has no strands.', name=name_of(chosen[0]))
     return sources
 
 

@@ -138,6 +138,21 @@ def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):
     assert "groom_closest_guides" not in found and found["groom_id"].only[0] == 0
 
 
+@pytest.mark.parametrize("ending", ["abc", "usdc", "hair"])
+def test_empty_guides_are_left_out_and_empty_hair_is_one_sentence(hair, tmp_path, ending):
+    guides = bpy.data.hair_curves["Guides"]
+    hair.data.vellus.is_live = False
+    guides.remove_curves()
+    path = tmp_path / f"groom.{ending}"
+    made = export(path, animation="NONE")
+    assert (made.guides, made.strands) == (0, 500)
+    path.unlink()
+    hair.data.remove_curves()
+    with pytest.raises(HairError, match='"Hair" has no strands'):
+        export(path, animation="NONE")
+    assert not path.exists()
+
+
 @pytest.mark.parametrize("way", ["excluded", "deleted"])
 def test_guides_without_an_object_are_where_they_were(twisted, tmp_path, way):
     """Guides in an excluded collection, or whose object was deleted, are exported in place."""
