@@ -13,6 +13,7 @@ from hair_addon.command_line import map_options
 from hair_addon.core.geometry.strands import lengths
 from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.shading import appearance
+from tests.support import appended
 from tests.support.reading import points
 
 RED, BLUE = (0.5, 0.125, 0.0625), (0.0625, 0.125, 0.5)
@@ -137,13 +138,7 @@ def test_files_and_settings_keep_ramps(coat, tmp_path):
     assert api.maps_of(coat) == (wanted,) and api.thickness_curve_of(coat) == "0:1 0.5:0.25:auto 1:0.5"
     assert strand_maps.read_looks(coat.data).is_same(looks)
     np.testing.assert_array_equal(curves.read_radii(coat.data), radii)
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        with bpy.data.libraries.load(path, link=is_linked) as (_there, here):
-            here.objects = ["Hair"]
-        bpy.context.collection.objects.link(here.objects[0])
-        bpy.context.view_layer.update()
-        found = bpy.data.hair_curves["Hair"]
+    for found in appended.in_new_files(path):
         assert map_items.maps_of(found.vellus) == (wanted,)
         assert strand_maps.read_looks(found).is_same(looks)
 

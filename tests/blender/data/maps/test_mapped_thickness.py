@@ -15,6 +15,7 @@ from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import map_items
 from hair_addon.command_line import map_options
 from hair_addon.core.maps.map_settings import MapSettings
+from tests.support import appended
 from tests.support.pictures import drawn_strands
 from tests.support.pictures.gpu_strands import drawn, window  # noqa: F401
 
@@ -111,13 +112,7 @@ def test_undo_files_and_appending_keep_maps(hair, tmp_path):
     np.testing.assert_array_equal(radii(bpy.data.hair_curves["Hair"]), mapped)
     path = str(tmp_path / "maps.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        with bpy.data.libraries.load(path, link=is_linked) as (_there, here):
-            here.objects = ["Hair"]
-        bpy.context.collection.objects.link(here.objects[0])
-        bpy.context.view_layer.update()
-        found = bpy.data.hair_curves["Hair"]
+    for found in appended.in_new_files(path):
         assert [one.setting for one in map_items.maps_of(found.vellus)] == [SETTING]
         np.testing.assert_array_equal(radii(found), mapped)
 

@@ -15,6 +15,7 @@ from hair_addon.blender.settings import map_items, shared_wetness
 from hair_addon.blender.ui import map_rows
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.maps.map_settings import MapSettings
+from tests.support import appended
 from tests.support.interface.layout import Layout
 from tests.support.pictures.gpu_strands import drawn, window  # noqa: F401
 
@@ -100,12 +101,8 @@ def test_undo_files_and_linked_hair_keep_the_wetness(wet, tmp_path):
     np.testing.assert_array_equal(wetness(bpy.data.hair_curves["Hair"]), found)
     path = str(tmp_path / "wet.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        with bpy.data.libraries.load(path, link=is_linked) as (_there, here):
-            here.objects = ["Hair"]
-        bpy.context.collection.objects.link(here.objects[0])
-        np.testing.assert_array_equal(wetness(bpy.data.hair_curves["Hair"]), found)
+    for there in appended.in_new_files(path):
+        np.testing.assert_array_equal(wetness(there), found)
 
 
 def test_a_missing_source_is_a_status_and_the_value_is_used(wet):

@@ -14,6 +14,7 @@ from hair_addon.command_line import map_options
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
 from hair_addon.core.maps.map_settings import MapSettings
+from tests.support import appended
 
 RADIUS = "styles.Curl.radius"
 FALLING = "0:1 0.5:1 1:0.2"
@@ -93,12 +94,7 @@ def test_copies_undo_files_and_settings_have_their_curve(curls, tmp_path):
     assert not api.maps_of(curls)
     api.apply_settings(curls, settings_file.read(tmp_path / "curls.json"))
     np.testing.assert_array_equal(points(curls), bent)
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        with bpy.data.libraries.load(path, link=is_linked) as (_there, here):
-            here.objects = ["Hair"]
-        bpy.context.collection.objects.link(here.objects[0])
-        found = bpy.data.hair_curves["Hair"]
+    for found in appended.in_new_files(path):
         np.testing.assert_array_equal(points(found), bent)
         assert map_items.maps_of(found.vellus) == (wanted,)
 

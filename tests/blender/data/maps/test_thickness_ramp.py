@@ -8,6 +8,7 @@ from hair_addon.blender.data.maps import ramps
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.settings import map_items
 from hair_addon.core.maps.map_settings import MapSettings
+from tests.support import appended
 
 
 def radii(hair):
@@ -85,13 +86,7 @@ def test_copies_undo_and_files_have_their_ramp(hair, tmp_path):
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(radii(bpy.data.hair_curves["Hair"]), straight)
-    for is_linked in (False, True):
-        bpy.ops.wm.read_homefile(use_empty=True)
-        with bpy.data.libraries.load(path, link=is_linked) as (_there, here):
-            here.objects = ["Hair"]
-        bpy.context.collection.objects.link(here.objects[0])
-        bpy.context.view_layer.update()
-        found = bpy.data.hair_curves["Hair"]
+    for found in appended.in_new_files(path):
         assert ramps.node_of(found.vellus.thickness_ramp) is not None
         np.testing.assert_array_equal(radii(found), bent)
 
