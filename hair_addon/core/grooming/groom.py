@@ -376,6 +376,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.exact_cells,
         interpolation.guide_weights,
         interpolation.interpolation,
+        interpolation.sharp_edges,
         grooming.guide_growth,
         geometry.curves.bspline,
         geometry.search.hash_grid,

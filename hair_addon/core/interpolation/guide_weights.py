@@ -24,7 +24,7 @@ from ..geometry.search import hash_grid
 from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
-from . import cpu_weights, part_lines
+from . import cpu_weights, part_lines, sharp_edges
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -42,7 +42,7 @@ class Candidates:
     """The guides nearest to each strand, nearest first, and the first excluded one: (S, k + 1) arrays on one device.
 
     indices int32, -1 in unused slots; ways float32 [m]: lengths of the paths to these guides, straight or around part
-    lines, inf in unused slots; guide_count: number of guides, above all indices.
+    lines and sharp edges, inf in unused slots; guide_count: number of guides, above all indices.
     """
 
     indices: "wp.array2d[int]"
@@ -151,6 +151,7 @@ def find_candidates(
     candidates, ways = _nearest_guides(guide_roots, roots, neighbour_limit + 1, regions)
     if lines is not None:
         candidates, ways = _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions)
+    sharp_edges.go_around(normals, guide_normals, candidates, ways)
     return Candidates(candidates, ways, len(guide_roots))
 
 

@@ -16,6 +16,8 @@ from .regions import Regions
 if TYPE_CHECKING:
     from .part_lines import PartLines
 
+CENTRES = 6  # searched, as the nearest may be on another face
+
 
 @dataclass(frozen=True)
 class RootBinder:
@@ -51,15 +53,21 @@ class RootBinder:
         return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
-        """Return (S, 2) int32: the two centers nearest to each strand, in its region and on its side of part lines.
+        """Return (S, 2) int32: the two centers nearest to each strand, -1 if there are fewer than two.
 
-        -1 if there are fewer than two.
+        They are in its region, on its side of part lines and, at sharp edges, on its face.
         """
         regions = self._with_guide_regions(strands, centres)
         found = interpolation.guide_weights.find_candidates(
-            strands.positions, strands.normals, centres.positions, centres.normals, 1, regions=regions, lines=self.lines
+            strands.positions,
+            strands.normals,
+            centres.positions,
+            centres.normals,
+            CENTRES - 1,
+            regions=regions,
+            lines=self.lines,
         )
-        nearest = found.indices.numpy().copy()
+        nearest = found.indices.numpy()[:, :2].copy()
         if regions is not None:
             of_strands, of_centres = regions
             nearest[(nearest >= 0) & (of_centres[nearest] != of_strands[:, None])] = -1

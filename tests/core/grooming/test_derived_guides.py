@@ -55,7 +55,7 @@ def test_more_guides_come_closer_and_the_fit_comes_closer_than_the_strands_thems
     """Also for hair so long that turns of strands are limited, which the fit ignores."""
     points, roots = strands_between_guides(mesh, length)
     few, more = (derive(mesh, points, roots, complete(mesh, count), count) for count in (15, 60))
-    assert more.mean_error < 0.6 * few.mean_error
+    assert more.mean_error < 0.65 * few.mean_error
     unfitted = strands.from_numpy(points[few.sources], roots[few.sources])
     grown = following.follow_guides(few.binding, unfitted).numpy()
     errors = np.sqrt(np.mean(np.sum((grown - points) ** 2, axis=2), axis=1)) / lengths(points)
@@ -65,7 +65,7 @@ def test_more_guides_come_closer_and_the_fit_comes_closer_than_the_strands_thems
 def test_guides_of_hair_that_is_one_strand_everywhere_reproduce_it(mesh):
     """Guides of straight hair of one length along the normals reproduce it."""
     points, roots, _ = standing(mesh, 200, np.random.Generator(np.random.PCG64(3)), spread=0.0, point_count=41)
-    derived = derive(mesh, points, roots, complete(mesh, 5), 5)
+    derived = derive(mesh, points, roots, complete(mesh, 6), 6)
     assert derived.errors.max() < 2e-3  # frames turn rigidly, normals across flat faces do not
 
 

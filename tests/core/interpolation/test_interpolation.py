@@ -9,8 +9,11 @@ from scipy.spatial.transform import Rotation
 from hair_addon.core.geometry.strands import offsets, segment_lengths
 from hair_addon.core.interpolation import interpolation
 from hair_addon.core.interpolation.hair_binding import SPREAD
+from hair_addon.core.interpolation.sharp_edges import BEGIN, END, HOLD
 from tests.support.devices import DEVICE
-from tests.support.strands.finding import find_guides
+from tests.support.strands.finding import find_guides, strands_between
+
+BEGIN_COSINE, END_COSINE = np.cos(BEGIN), np.cos(END)
 
 
 def vectors(array, device=DEVICE):
@@ -19,13 +22,6 @@ def vectors(array, device=DEVICE):
 
 def unit(array):
     return array / np.linalg.norm(array, axis=-1, keepdims=True)
-
-
-def strands_between(roots, normals, guides, guide_normals, distance=None, limit=8, keep_length=1.0):
-    """Return points (S, P, 3) by both stages; guides (G, P, 3)."""
-    roots, normals, guides, guide_normals = map(vectors, (roots, normals, guides, guide_normals))
-    weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, distance, limit)
-    return interpolation.interpolate(roots, normals, guides, guide_normals, weights, keep_length).numpy()
 
 
 def least_rotations(starts, end):
@@ -59,11 +55,17 @@ def scene(rng):
     return {"roots": roots, "normals": normals, "guides": guides, "guide_normals": guide_normals}
 
 
-def weights_of(roots, guide_roots, distance, limit):
-    """Return (S, G) weights by the formula of guide_weights.py over all guides, in double precision."""
+def weights_of(roots, guide_roots, distance, limit, facing=1.0):
+    """Return (S, G) weights by the formula of guide_weights.py over all guides, in double precision.
+
+    facing: (S, G) cosines between the normals of strands and guides.
+    """
     apart = np.linalg.norm(np.float32(roots)[:, None].astype(float) - np.float32(guide_roots)[None], axis=-1)
+    left_out = np.sort(apart, axis=1)[:, limit] if limit < len(guide_roots) else np.full(len(roots), np.inf)
+    other_face = np.clip((BEGIN_COSINE - facing) / (BEGIN_COSINE - END_COSINE), 0.0, 1.0)
+    other_face = HOLD * other_face**2 * (3.0 - 2.0 * other_face)
+    apart = apart + other_face * np.maximum(np.minimum(left_out, apart.max(axis=1))[:, None] - apart, 0.0)
     ordered = np.sort(apart, axis=1)
-    left_out = ordered[:, limit] if limit < len(guide_roots) else np.full(len(roots), np.inf)
     if distance is None:
         distance = np.where(np.isfinite(left_out), left_out, 1.25 * ordered[:, -1])
     distance = np.maximum(distance, 1.25 * ordered[:, 0])[:, None]
@@ -77,7 +79,7 @@ def weights_of(roots, guide_roots, distance, limit):
 def test_strands_are_what_the_equations_say(scene, distance, keep_length):
     """Strands equal a literal computation of Eq. 7-10, with recursion, all guides, and rotations by scipy."""
     guides = np.float32(scene["guides"]).astype(float)
-    weights = weights_of(scene["roots"], guides[:, 0], distance, 8)
+    weights = weights_of(scene["roots"], guides[:, 0], distance, 8, scene["normals"] @ scene["guide_normals"].T)
     guide_offsets, guide_lengths = offsets(guides), np.pad(segment_lengths(guides), [(0, 0), (1, 0)])
     expected = np.empty((200, 21, 3))
     for strand, (q, normal, w) in enumerate(zip(scene["roots"], scene["normals"], weights, strict=True)):
@@ -94,7 +96,8 @@ def test_strands_are_what_the_equations_say(scene, distance, keep_length):
 
 def test_segments_are_as_long_as_the_guides_are_on_average(scene):
     """Segments are as long as the guides' on average, however much guides disagree."""
-    weights = weights_of(scene["roots"], scene["guides"][:, 0], 0.5, 8)
+    facing = scene["normals"] @ scene["guide_normals"].T
+    weights = weights_of(scene["roots"], scene["guides"][:, 0], 0.5, 8, facing)
     wanted = weights @ segment_lengths(scene["guides"])
     kept = segment_lengths(strands_between(**scene, distance=0.5))
     np.testing.assert_allclose(kept, wanted, rtol=2e-3)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hair_addon.core.interpolation import sharp_edges
 from hair_addon.core.long_work import Stopped
 from hair_addon.core.styling import clump, clump_trees, program
 from tests.support.dynamics.stepped import curved_strands, largest_move, stepped, straight_strands
@@ -130,9 +131,13 @@ def test_a_strand_belongs_to_the_nearest_centre(hair):
     bound = hair.bound(settings)
     centres = bound.levels[1].binding.positions.numpy()
     apart = np.linalg.norm(hair.binding.positions.numpy()[:, None] - centres, axis=-1)
-    np.testing.assert_allclose(
-        np.take_along_axis(apart, bound.data.members.numpy()[1][:, None], 1)[:, 0], apart.min(axis=1), atol=1e-6
+    own = np.take_along_axis(apart, bound.data.members.numpy()[1][:, None], 1)[:, 0]
+    is_nearest = own <= apart.min(axis=1) + 1e-6
+    # At the ears, the nearest center may be on the other side.
+    facing = np.einsum(
+        "sc,sc->s", hair.binding.normals.numpy(), bound.levels[1].binding.normals.numpy()[apart.argmin(axis=1)]
     )
+    assert is_nearest.mean() > 0.98 and np.all(is_nearest | (facing < np.cos(sharp_edges.BEGIN)))
 
 
 def test_a_part_of_the_strands_crosses_over(hair):
