@@ -61,28 +61,37 @@ def _steps(strands, to_world, limits, view):
     lengths = strands.mean_length * samples_per_meter
     pieces = np.ceil(np.minimum(lengths / _PIECE_LENGTH, strands.point_count)).astype(int)
     point_counts = np.minimum(np.maximum(pieces + 1, _LEAST_POINTS), strands.point_count)
-    fewest = np.minimum(point_counts, _points_that_show(strands, lengths))
+    fewest = np.minimum(point_counts, _points_that_show(strands, lengths, _GREATEST_BEND, _LEAST_POINTS))
     point_counts = np.where(strand_counts < count, fewest, point_counts)
     # With a limit by the artist each pass draws the same strands.
     first = int(float(view["coverage_turn"]) % 1.0 * count) if part == 1.0 else 0
     return drawing.Steps(point_counts, np.maximum(strand_counts, 1), first)
 
 
-def _points_that_show(strands, lengths):
-    """Return (N,) fewest evenly chosen points that show the bends of `StrandsOnGPU`; lengths: (N,) of strands
-    [samples].
+def points_within(strands, to_world, view, bend):
+    """Return (N,) fewest evenly chosen points with which `StrandsOnGPU` at (N, 4, 4) places deviate by at most `bend`
+    [samples] from their curves in a view.
+    """
+    samples_per_unit, _diameters = _sizes_in(view, strands, to_world)
+    lengths = strands.mean_length * samples_per_unit * drawing.scales_of(to_world)
+    return _points_that_show(strands, lengths, bend, 2)
+
+
+def _points_that_show(strands, lengths, bend, least):
+    """Return (N,) fewest evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by at most `bend`
+    [samples] from their curves; lengths: (N,) of strands [samples].
 
     Returns all points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is
     longer than the chord by the fraction 8/3 (s / c)².
     """
     pieces, enough = strands.point_count - 1, np.full(len(lengths), strands.point_count)
     are_shown = np.ones(len(lengths), bool)
-    for step in range(2, pieces // (_LEAST_POINTS - 1) + 1 if strands.has_points else 0):
+    for step in range(2, pieces // (least - 1) + 1 if strands.has_points else 0):
         if pieces % step:
             continue
         drawn = pieces // step
         bends = lengths / drawn * math.sqrt(0.375 * max(strands.lengthening(drawn + 1) - 1.0, 0.0))
-        are_shown &= bends <= _GREATEST_BEND
+        are_shown &= bends <= bend
         enough[are_shown] = drawn + 1
         if not are_shown.any():
             break

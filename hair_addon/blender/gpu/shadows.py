@@ -6,7 +6,7 @@ from dataclasses import replace
 import gpu
 import numpy as np
 
-from . import drawing, strand_batches, surface_textures
+from . import drawing, level_of_detail, strand_batches, surface_textures
 from .programs import scene_programs, shadow_programs, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
@@ -24,9 +24,9 @@ _SHADE_DISTANCE = 0.15
 _LEAST_WIDE = 1e-4  # minimum radius [m] of a wide map
 _ALL = drawing.Steps()
 
-# Strands at rest are drawn with fewer points, which shorten them by at most this fraction: the bends that are lost are
-# smaller than a texel.
-_LENGTHENING = 0.005
+# Strands at rest are drawn with fewer points if they deviate from their curves by at most this distance [texels]:
+# chords are on the inner side of curved hair, so outer strands would be in front of all shadows.
+_GREATEST_BEND = 0.1
 
 # While hair moves, the sphere that maps are aimed at stays until hair does not fit, and is then enlarged by the first
 # factor, or until it is too large by the second factor: maps whose texels move with every edit flicker.
@@ -297,11 +297,10 @@ def _records(strands, view, to_world, steps, is_steady):
     Strands at rest are drawn with the fewest points that show them.
     """
     if steps.point_count is None and not is_steady:
-        steps = replace(steps, point_count=strands.points_that_show(_LENGTHENING))
+        steps = replace(steps, point_count=level_of_detail.points_within(strands, to_world, view, _GREATEST_BEND))
     records = drawing.strand_records(strands, view, to_world, steps)
-    drawn_points = int(records["drawn_points"][0])
-    if drawn_points < strands.point_count:
-        records["thickness"] *= strands.lengthening(drawn_points)
+    for index in np.flatnonzero(records["drawn_points"] < strands.point_count):
+        records["thickness"][index] *= strands.lengthening(int(records["drawn_points"][index]))
     return records
 
 

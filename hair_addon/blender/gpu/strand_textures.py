@@ -97,19 +97,6 @@ class StrandsOnGPU:
             self.lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
         return self.lengthenings[point_count]
 
-    def points_that_show(self, part: float) -> int:
-        """Return the least number of evenly chosen points with which strands are shorter by at most this fraction.
-
-        All points if only the GPU has the current points.
-        """
-        pieces, enough = self.point_count - 1, self.point_count
-        steps = [step for step in range(2, pieces + 1) if pieces % step == 0] if self.has_points else []
-        for step in steps:
-            if self.lengthening(pieces // step + 1) > 1.0 + part:
-                break
-            enough = pieces // step + 1
-        return enough
-
 
 def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
     """Return the `StrandsOnGPU` of points (S, P, 3) and radii (S, P), float32, in one coordinate system.

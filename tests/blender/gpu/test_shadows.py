@@ -197,33 +197,62 @@ def test_the_sphere_around_hair_touches_it(scene, rng):
         assert 0.8 * radius < farthest < radius * (1.0 + 1e-5)
 
 
-def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng):
-    """At rest, maps draw straight strands with two points and curls with all, and differ by at most half a texel.
+def combed(rng, radius, strand_count, point_count=33):
+    """Return strands that lie around a ball of radius 10 cm, up to 3 mm above it, as `tuft`."""
+    root = rng.normal(size=(strand_count, 1, 3))
+    root /= np.linalg.norm(root, axis=2, keepdims=True)
+    way = np.cross(root, rng.normal(size=root.shape))
+    way /= np.linalg.norm(way, axis=2, keepdims=True)
+    angle = np.linspace(0.0, 1.5, point_count)[:, None]
+    height = 0.1 + 0.003 * rng.random((strand_count, 1, 1))
+    points = height * (np.cos(angle) * root + np.sin(angle) * way)
+    return points.astype(np.float32), np.full(points.shape[:2], radius, np.float32)
 
-    The map differs from that of all points by at most half a texel.
-    """
-    points, radii = tuft(rng)
-    straight = points[:, :1] + np.linspace(0.0, 1.0, points.shape[1])[:, None] * (points[:, -1:] - points[:, :1])
-    on_gpu = strand_textures.upload_strands(straight.astype(np.float32), radii)
-    assert on_gpu.points_that_show(0.005) == 2
+
+def lit_by_rays(points, radius, places):
+    """Return (N,) bool: whether rays from places (N, 3) along Y miss all strands (S, P, 3)."""
+    start, end = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
+    # Segments beside all places matter to no ray.
+    low, high = places.min(axis=0) - radius, places.max(axis=0) + radius
+    is_near = ((np.maximum(start, end) > low) & (np.minimum(start, end) < high))[:, [0, 2]].all(axis=1)
+    start, along = start[is_near], (end - start)[is_near]
+    beside = places[:, None, ::2] - start[:, ::2]
+    part = np.clip((beside * along[:, ::2]).sum(axis=2) / np.square(along[:, ::2]).sum(axis=1), 0.0, 1.0)
+    meets = np.square(beside - part[..., None] * along[:, ::2]).sum(axis=2) < radius**2
+    is_before = start[:, 1] + part * along[:, 1] > places[:, 1, None]
+    return ~(meets & is_before).any(axis=1)
+
+
+def test_grazing_light_reaches_as_many_places_among_curved_strands_as_rays_do(scene, rng):
+    """Maps of curved strands drawn with few points would be inside of the hair, and light its outer strands."""
+    points, radii = combed(rng, 4e-5, 5000)
+    hair = strand_textures.upload_strands(points, radii)
+    middle = points.reshape(-1, 3)
+    places = middle[(np.abs(middle[:, 0]) < 0.01) & (np.abs(middle[:, 1]) < 0.03) & (middle[:, 2] > 0.0)]
+    places = places + rng.normal(scale=3e-4, size=places.shape).astype(np.float32)  # between strands
+    places = places[np.linalg.norm(places, axis=1) > 0.102]  # of the outer third
+    by_rays = lit_by_rays(points, 4e-5, places)
+    by_maps = lit(sun(0.5 * np.pi, 0.0), hair, [], places)
+    assert by_maps.mean() == pytest.approx(by_rays.mean(), rel=0.1)
+
+
+def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng):
+    """At rest, maps draw straight strands with two points, curls with all, and arcs with fewer on coarser maps."""
+    points, _radii = tuft(rng, 300)
+
+    def drawn_points(shape, size=256):
+        at = points[:, :1] + shape
+        hair = strand_textures.upload_strands(at.astype(np.float32), np.full(at.shape[:2], 1e-4, np.float32))
+        placed = [(hair, np.eye(4))]
+        view = shadows._aim(sun(0.4, 0.7)["light"][0], placed, drawing.bounding_sphere(placed), size)
+        records = shadows._records(hair, view, np.eye(4)[None], drawing.Steps(), is_steady=False)
+        return int(records["drawn_points"][0])
+
+    straight = np.linspace(0.0, 0.06, 21)[:, None] * np.array([0.0, 0.6, 0.8])
+    assert drawn_points(straight) == 2
     turn = np.linspace(0.0, 12.0 * np.pi, 33)
-    curls = np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), 0.002 * turn], axis=-1)
-    on_gpu = strand_textures.upload_strands(
-        (points[:, :1] + curls).astype(np.float32), np.full((len(points), 33), 1e-4, np.float32)
-    )
-    assert on_gpu.points_that_show(0.005) == 33
+    assert drawn_points(np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), 0.002 * turn], axis=-1)) == 33
     turn = np.linspace(0.0, 1.5, 61)
     arcs = np.stack([0.2 * np.sin(turn), 0.0 * turn, 0.2 * np.cos(turn)], axis=-1)
-    on_gpu = strand_textures.upload_strands(
-        (points[:, :1] + arcs).astype(np.float32), np.full((len(points), 61), 1e-4, np.float32)
-    )
-    fewer = on_gpu.points_that_show(0.005)
-    assert 4 <= fewer <= 16
-    counts = []
-    for steps in (drawing.Steps(), drawing.Steps(point_count=61)):
-        maps = shadows.ShadowMaps(128, 1)
-        maps.draw(sun(0.4, 0.7), [(on_gpu, np.eye(4))], [], steps)
-        counts.append(np.array(maps.samplers["hair_layers"].read()).reshape(128, 128, 4)[..., 3])
-    beside = [of.reshape(32, 4, 32, 4).mean(axis=(1, 3)) for of in counts]
-    np.testing.assert_allclose(beside[0].sum(), beside[1].sum(), rtol=0.01)
-    assert np.abs(beside[0] - beside[1]).mean() < 0.1 * beside[1].mean()
+    counts = [drawn_points(arcs, size) for size in (64, 512)]
+    assert 4 <= counts[0] < counts[1] <= 31
