@@ -11,7 +11,7 @@ from ..host.caches import Cache
 _BEGINNINGS = ("guide_index", "guide_weight")
 _PROPERTIES = ("attribute_name", "string")  # properties of nodes, besides input sockets
 
-# `_key` → "read" or "unread"; cleared when nodes change by `stored_guide_maps.follow`.
+# session_uid of a node group or material → "read" or "unread"; `changed` drops values whose nodes may have changed.
 reading_cache = Cache()
 
 
@@ -26,12 +26,19 @@ def are_read(hair):
     ]
     if any(map(_has_input, modifiers)):
         return True
-    return reading_cache.get(_key(modifiers), lambda: "read" if _are_in_nodes() else "unread") == "read"
+    trees = [(group.session_uid, group) for group in bpy.data.node_groups]
+    trees += [(m.session_uid, m.node_tree) for m in bpy.data.materials if m.node_tree is not None]
+    return any(reading_cache.get(uid, lambda tree=tree: _reading_of(tree)) == "read" for uid, tree in trees)
 
 
-def _key(modifiers):
-    groups = (modifier.node_group.session_uid for modifier in modifiers)
-    return len(bpy.data.node_groups), len(bpy.data.materials), *groups
+def changed(datablock):
+    """Drop what is known of a reported material or node tree; of all, if it is None or belongs to no material."""
+    if datablock is not None and datablock.is_embedded_data:
+        datablock = next((m for m in bpy.data.materials if m.node_tree == datablock), None)
+    if datablock is None:
+        reading_cache.clear()
+    else:
+        reading_cache.invalidate(datablock.session_uid)
 
 
 def _has_input(modifier):
@@ -42,9 +49,8 @@ def _has_input(modifier):
     return any(_is_named(getattr(socket, name, None)) for socket in sockets for name in ("value", "attribute_name"))
 
 
-def _are_in_nodes():
-    trees = [*bpy.data.node_groups, *(m.node_tree for m in bpy.data.materials if m.node_tree is not None)]
-    return any(_names(node) for tree in trees for node in tree.nodes)
+def _reading_of(tree):
+    return "read" if any(map(_names, tree.nodes)) else "unread"
 
 
 def _names(node):

@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import surface_space, usable_surfaces
+from ..data.maps import strand_maps
 from ..data.strands import curves, curves_objects
 from ..groom import frame_faces, hidden_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -100,6 +101,9 @@ def after_depsgraph_update(scene, depsgraph):
         for datablock in _of_kind("HAIR"):
             if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
+            # The undo step may have been saved before painted looks were written.
+            if strand_maps.has_looks(datablock.vellus):
+                datablock.vellus.is_shading_stale = True
     if any(report.is_of(bpy.types.Image, bpy.types.World) for report in reports):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
@@ -268,8 +272,7 @@ def _evaluate_hair(hair, depsgraph, combed):
     elif follows:
         live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
     if state.is_shading_stale:
-        looks.evaluate_shading(hair)
-        events.looks_written(hair)
+        live_hair.evaluate_shading(hair)
 
 
 def _is_ready(datablock, depsgraph):

@@ -71,6 +71,7 @@ COPIES = (
     guide_map_readers.reading_cache,
     unread_nodes.sentence_cache,
     image_pixels.pixel_cache,
+    strand_maps.pending_cache,
     dynamics_state.map_status_cache,
 )
 
@@ -80,6 +81,7 @@ OTHERS = (
     recording.shape_cache,
     scene.faces_cache,
     scene.surface_cache,
+    sources.root_cache,
     sources.texel_cache,
     sources.level_cache,
     sources.mean_cache,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair: updates while guides are combed and masks are painted.
 
-In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and the hair's Curves
-are written at the end of the interaction, or before they are read. Without a window the Curves are written at once.
+In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and so are looks by maps
+that are painted. The hair's Curves are written at the end of the interaction, or before they are read. Without a window
+the Curves are written at once.
 """
 
 import sys
@@ -11,6 +12,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import surface_space
+from ..data.maps import strand_maps
 from ..data.strands import curves, simulated_guides
 from ..groom import (
     bindings,
@@ -28,6 +30,7 @@ from ..groom.foreign import kept_following, kept_thickness
 from ..groom.styles import painted_masks
 from ..host import running
 from ..host.notices import text_of
+from ..materials import looks
 from ..render import hair_cache, modified_hair
 from ..settings import style_items
 from . import events
@@ -263,6 +266,7 @@ def write_all(*_args):
         bound = bindings.of(hair)
         if bound is not None and not bound.is_written:
             _write(hair)
+        strand_maps.write_pending(hair)
 
 
 def _write(hair):
@@ -297,6 +301,19 @@ def write_soon(hair):
     if not running.has_window() or _is_drawn_modified(hair):
         _write(hair)
         return
+    _begin_pause()
+
+
+def evaluate_shading(hair):
+    """Update the look of hair; in a window, looks by maps of hair that Vellus draws are written after a pause."""
+    is_soon = running.has_window() and hair.vellus.is_drawn and not _is_drawn_modified(hair)
+    looks.evaluate_shading(hair, is_soon)
+    if strand_maps.is_pending(hair):
+        _begin_pause()
+    events.looks_written(hair)
+
+
+def _begin_pause():
     cancel_writing()  # restarts the pause with every change: a stroke consists of many
     bpy.app.timers.register(write_after_pause, first_interval=_PAUSE, persistent=True)
 

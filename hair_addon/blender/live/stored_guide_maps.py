@@ -12,12 +12,12 @@ from . import live_hair
 
 def follow(reports, depsgraph):
     """Store the missing guide weights of hair whose nodes read them; reports: `updates.Update`s."""
-    have_nodes_changed = any(report.is_of(bpy.types.NodeTree, bpy.types.Material) for report in reports)
-    if have_nodes_changed:
-        guide_map_readers.reading_cache.clear()
+    with_nodes = [report for report in reports if report.is_of(bpy.types.NodeTree, bpy.types.Material)]
+    for report in with_nodes:
+        guide_map_readers.changed(report.datablock)
     objects = {report.datablock for report in reports if report.is_of(bpy.types.Object)} - {None}
     of_changed_objects = {one.data for one in objects if one.type == "CURVES"}
-    for hair in bpy.data.hair_curves if have_nodes_changed else of_changed_objects:
+    for hair in bpy.data.hair_curves if with_nodes else of_changed_objects:
         if _lacks_map(hair) and guide_map_readers.are_read(hair):
             _store(hair, depsgraph)
 

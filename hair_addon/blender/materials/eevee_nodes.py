@@ -14,6 +14,7 @@ import numpy as np
 from ...core.shading import appearance
 from ...core.shading.fibre.pigment import color_from_falloff
 from ...core.shading.fibre.principled import beta_r_from_roughness
+from . import node_values
 
 _PREFIX = "EEVEE "  # of the names of our nodes, which identifies them
 
@@ -75,17 +76,19 @@ def write(tree, hair_node, look, varied_color=None):
     gloss = _GLOSS * strands.reflectance / appearance.kajiya_kay_strand_settings(appearance.Appearance()).reflectance
     color = nodes["Color"].inputs
     if varied_color is not None:
-        tree.links.new(varied_color, color[0])
+        node_values.link(tree, varied_color, color[0])
     else:
         for link in color[0].links:
             tree.links.remove(link)
-        color[0].default_value = color_from_falloff(np.array(appearance.sigma_a(look)), falloff_of(look))
-    color[1].default_value, color[2].default_value = (_GAIN,) * 3, (_SURFACE,) * 3
-    nodes["Entering"].inputs[1].default_value = (0.5, 0.5, 0.5)
-    nodes["Highlight"].inputs["Color"].default_value = (gloss, gloss, gloss, 1.0)
+        even = color_from_falloff(np.array(appearance.sigma_a(look)), falloff_of(look))
+        node_values.assign(color[0], "default_value", even)
+    node_values.assign(color[1], "default_value", (_GAIN,) * 3)
+    node_values.assign(color[2], "default_value", (_SURFACE,) * 3)
+    node_values.assign(nodes["Entering"].inputs[1], "default_value", (0.5, 0.5, 0.5))
+    node_values.assign(nodes["Highlight"].inputs["Color"], "default_value", (gloss, gloss, gloss, 1.0))
     # A fiber's lobe in half angles is as wide as GGX with slopes of √2 times its deviation; roughness = √slope.
     slope = math.sqrt(2.0) * beta_r_from_roughness((1.0 - strands.coat) * strands.roughness)
-    nodes["Highlight"].inputs["Roughness"].default_value = min(math.sqrt(slope), 1.0)
+    node_values.assign(nodes["Highlight"].inputs["Roughness"], "default_value", min(math.sqrt(slope), 1.0))
 
 
 def _has_others(tree):

@@ -9,12 +9,15 @@ from ..settings import setting_properties
 from . import materials
 
 
-def evaluate_shading(target):
-    """Update a hair's material from its settings, and its display type from *Shaded in Viewport*."""
+def evaluate_shading(target, is_soon=False):
+    """Update a hair's material from its settings, and its display type from *Shaded in Viewport*.
+
+    is_soon: looks by maps are stored by `strand_maps.write_pending`.
+    """
     target.vellus.is_shading_stale = False
     curves_objects.draw_natively(target, not target.vellus.is_drawn)
     try:
-        errors = materials.write_hair_material(target)
+        errors = materials.write_hair_material(target, is_soon)
         target.vellus.shading_status = str(errors[0]) if errors else ""
     except HairError as error:
         target.vellus.shading_status = str(error)

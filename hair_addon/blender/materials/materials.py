@@ -8,24 +8,25 @@ from ..data.maps import strand_maps
 from ..data.strands import curves as curve_data
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
-from . import eevee_nodes, strand_nodes, wet_nodes
+from . import eevee_nodes, node_values, strand_nodes, wet_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
 
 _OURS = "is_vellus_hair"  # the custom property of materials created by Vellus
 
 
-def write_hair_material(curves):
+def write_hair_material(curves, is_soon=False):
     """Give Curves a Principled Hair material of their appearance; an artist's material is left alone.
 
-    Looks by maps are stored in the Curves. Returns [`HairError`] about missing sources of maps.
+    Looks by maps are stored in the Curves; is_soon: by `strand_maps.write_pending`. Returns [`HairError`] about missing
+    sources of maps.
 
     Linked Curves keep their materials: undo does not restore assignments to linked data, so that they would keep a
     deleted material, which crashes Blender.
     """
     if curves.library is not None:
         return []
-    errors = strand_maps.write_looks(curves)
+    looks, errors = strand_maps.write_looks(curves, is_soon)
     slot = next((slot for slot, m in enumerate(curves.materials) if m is not None), None)
     if slot is None:
         material = bpy.data.materials.new(name_of(curves))
@@ -41,7 +42,7 @@ def write_hair_material(curves):
         node = next(nodes, None)
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
-            is_mapped, is_radial = strand_maps.has(curves), strand_maps.has_radial(curves)
+            is_mapped, is_radial = looks is not None, looks is not None and looks.radial is not None
             if is_mapped or not appearance.strand_settings(look).is_even:
                 curve_data.write_randoms(curves)  # older hair lacks this attribute
             if _has_places(curves):
@@ -51,14 +52,14 @@ def write_hair_material(curves):
             else:
                 wet_nodes.remove(material.node_tree, node)
                 _fill(node, material, look, is_mapped, is_radial)
-            if is_mapped:
-                _show_mean(material, look, strand_maps.read_looks(curves))
+            _show_mean(material, look, looks)
     return errors
 
 
 def _show_mean(material, look, looks):
     """Give a material the mean color of strands, for renderers without hair."""
-    material.diffuse_color = (*strand_looks.mean_color(look, looks), 1.0)
+    color = appearance.mean_color(look) if looks is None else strand_looks.mean_color(look, looks)
+    node_values.assign(material, "diffuse_color", (*color, 1.0))
 
 
 def _has_places(curves):
@@ -111,8 +112,7 @@ def _fill(node, material, look, is_mapped=False, is_radial=False):
     sockets = {socket.identifier: socket for socket in node.inputs}
     # The color is for renderers without hair, such as Blender's viewport shading.
     for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
-        sockets[name].default_value = value
-    material.diffuse_color = color
+        node_values.assign(sockets[name], "default_value", value)
     variation, varied_color = appearance.strand_settings(look), None
     if variation.is_even and not is_mapped:
         strand_nodes.remove(material.node_tree)

@@ -12,6 +12,7 @@ import math
 
 from ...core.shading.fibre.pigment import FALLOFF, LEAST_LIGHT, color_falloff
 from ..data.maps import strand_maps
+from . import node_values
 
 _PREFIX = "Vellus "  # of the names of our nodes, which identifies them
 
@@ -109,7 +110,7 @@ def write(tree, hair_node, variation, falloff, is_mapped=False, is_radial=False)
         if name not in graph[0] or (is_mapped and name == "Tip"):
             continue
         for socket, value in inputs.items():
-            _input(nodes[name], socket).default_value = value
+            node_values.assign(_input(nodes[name], socket), "default_value", value)
     if is_mapped:
         _scale_roughness(tree, hair_node, nodes)
         if is_radial:
@@ -153,7 +154,7 @@ def _scale_roughness(tree, hair_node, nodes):
         node.operation, node.name, node.label, node.hide = "MULTIPLY", _PREFIX + name, "Roughness", True
         node.location = (hair_node.location.x - _SPACING[0], hair_node.location.y - 80.0)
         tree.links.new(_output(nodes["Roughness"], "Fac"), node.inputs[0])
-    node.inputs[1].default_value = _input(hair_node, "Roughness").default_value
+    node_values.assign(node.inputs[1], "default_value", _input(hair_node, "Roughness").default_value)
     _link(tree, node.outputs[0], hair_node, "Roughness")
 
 
@@ -161,9 +162,9 @@ def _vary_radial_roughness(tree, hair_node, nodes, falloff):
     """Give a hair node and the falloff of colors the radial roughness of each strand."""
     _link(tree, _output(nodes["Radial Roughness"], "Fac"), hair_node, "Radial Roughness")
     part = -falloff / float(color_falloff(_input(hair_node, "Radial Roughness").default_value))
-    nodes[_POWERS[0]].inputs[0].default_value = part * FALLOFF[-1]
+    node_values.assign(nodes[_POWERS[0]].inputs[0], "default_value", part * FALLOFF[-1])
     for name, coefficient in zip(_POWERS, reversed(FALLOFF[:-1]), strict=True):
-        nodes[name].inputs[2].default_value = part * coefficient
+        node_values.assign(nodes[name].inputs[2], "default_value", part * coefficient)
 
 
 def _build(tree, wanted, links):

@@ -4,6 +4,8 @@
 The mix is the same as in the viewport: `appearance.wet_share` of the same attribute.
 """
 
+from . import node_values
+
 _PREFIX = "Wet Places "  # of the names of our nodes, which identifies them
 
 _HAIR = "Hair"  # the node of the wettest look
@@ -27,7 +29,8 @@ def write(tree, hair_node, wetness_range):
         remove(tree, hair_node)
         nodes = _build(tree, hair_node)
     inputs = {socket.identifier: socket for socket in nodes["Share"].inputs}
-    inputs["From Min"].default_value, inputs["From Max"].default_value = wetness_range
+    for name, value in zip(("From Min", "From Max"), wetness_range, strict=True):
+        node_values.assign(inputs[name], "default_value", value)
     return nodes[_HAIR]
 
 

@@ -15,6 +15,11 @@ MOST_SIDE = 2048  # texels along a side: larger images are averaged to limit mem
 
 _ROWS_AT_ONCE = 256
 _LEAST_ROWS = 64  # fewer are not worth a thread
+_LEAST_PARTS = 2048  # fewer are not worth a thread
+
+_LANES = 16  # words of a digest
+_PART = 256  # words of a part of an image with one digest
+_block = wp.types.vector(length=_LANES, dtype=wp.uint32)
 
 
 def masks(
@@ -49,6 +54,62 @@ def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | No
     words_per_texel = now.shape[2] * 4 // np.dtype(word).itemsize
     texels = np.flatnonzero(is_changed[changed].any(axis=0)) // words_per_texel
     return changed, slice(int(texels[0]), int(texels[-1]) + 1)
+
+
+def digests(pixels: np.ndarray) -> np.ndarray:
+    """Return digests (N, 16) uint32 of the parts of an image (H, W, C) float32, to detect changes without a copy.
+
+    A part has 256 words, one after the other; the last part may have fewer words, which are filled with zeros. Digests
+    take half the time of a comparison with a copy, which is limited by memory.
+    """
+    words = np.ascontiguousarray(pixels, np.float32).view(np.uint32).ravel()
+    whole_count = len(words) // _PART
+    found = np.empty((-(-len(words) // _PART), _LANES), np.uint32)
+    parts = [(words[: whole_count * _PART], found[:whole_count])]
+    if whole_count < len(found):
+        parts.append((np.pad(words[whole_count * _PART :], (0, -len(words) % _PART)), found[whole_count:]))
+    for some, out in parts:
+        blocks = wp.array(some.reshape(-1, _PART // _LANES, _LANES), dtype=_block, device="cpu", copy=False)
+        sums = wp.array(out, dtype=_block, device="cpu", copy=False)
+        inputs = [parallel.Rows(blocks)]
+        parallel.launch(_digest, len(out), inputs=inputs, outputs=[sums], device="cpu", least_rows=_LEAST_PARTS)
+    return found
+
+
+@wp.kernel
+def _digest(
+    parts: wp.array2d[_block],
+    # outputs
+    out_digests: wp.array[_block],
+):
+    """Evaluate a polynomial of each lane's words: a change of a single word always changes it."""
+    part = wp.tid()
+    blocks = parts[part]
+    total = _block(wp.uint32(0))
+    for place in range(blocks.shape[0]):
+        words = blocks[place]
+        # The upper half is mixed into the lower bits, as in `fingerprint`.
+        total = wp.uint32(33) * total + words + wp.uint32(31) * (words / wp.uint32(65536))
+    out_digests[part] = total
+
+
+def box_of_changed_parts(
+    before: np.ndarray, now: np.ndarray, shape: tuple[int, int, int]
+) -> tuple[slice, slice] | None:
+    """Return the slices of rows and columns of the parts of an image whose `digests` differ; None if all agree.
+
+    shape: (H, W, C) of the image. The box contains all changes, and up to a part more on both sides.
+    """
+    height, width, channels = shape
+    changed = np.flatnonzero((before.view(np.uint64) != now.view(np.uint64)).any(axis=1))
+    if not len(changed):
+        return None
+    in_row = width * channels
+    first, last = changed * _PART, np.minimum((changed + 1) * _PART, height * in_row) - 1
+    rows = slice(int(first[0]) // in_row, int(last[-1]) // in_row + 1)
+    if (first // in_row != last // in_row).any():
+        return rows, slice(0, width)
+    return rows, slice(int((first % in_row).min()) // channels, int((last % in_row).max()) // channels + 1)
 
 
 def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -104,40 +165,44 @@ def _convert(
 ):
     """Convert a row: non-finite and negative components become 0, and colors are multiplied by alpha if straight."""
     row = wp.tid()
-    channels = pixels.shape[2]
-    for column in range(pixels.shape[1]):
-        red = _component(pixels[row, column, 0], is_srgb, linear_bytes)
-        green = red
-        blue = red
-        if channels >= 3:
-            green = _component(pixels[row, column, 1], is_srgb, linear_bytes)
-            blue = _component(pixels[row, column, 2], is_srgb, linear_bytes)
+    texels = pixels[row]
+    found = out_pixels[row]
+    last = texels.shape[1] - 1
+    green_channel = 0
+    blue_channel = 0
+    if last >= 2:
+        green_channel = 1
+        blue_channel = 2
+    for column in range(texels.shape[0]):
+        red = _component(texels[column, 0], is_srgb, linear_bytes)
+        green = _component(texels[column, green_channel], is_srgb, linear_bytes)
+        blue = _component(texels[column, blue_channel], is_srgb, linear_bytes)
         alpha = float(1.0)
         if has_alpha:
-            alpha = _within_one(pixels[row, column, channels - 1])
+            alpha = _within_one(texels[column, last])
         if is_straight:
             red *= alpha
             green *= alpha
             blue *= alpha
-        if out_pixels.shape[2] == 4:
-            out_pixels[row, column, 0] = red
-            out_pixels[row, column, 1] = green
-            out_pixels[row, column, 2] = blue
-            out_pixels[row, column, 3] = alpha
+        if found.shape[1] == 4:
+            found[column, 0] = red
+            found[column, 1] = green
+            found[column, 2] = blue
+            found[column, 3] = alpha
         else:
             mean = (red + green + blue) / 3.0
             if red == green and red == blue:
                 mean = red  # without rounding
-            out_pixels[row, column, 0] = mean
+            found[column, 0] = mean
 
 
 @wp.func
 def _component(value: float, is_srgb: bool, linear_bytes: wp.array[float]) -> float:
     """Return a linear component of a color."""
+    if is_srgb:
+        return linear_bytes[int(_within_one(value) * 255.0 + 0.5)]
     if not wp.isfinite(value):
         return 0.0
-    if is_srgb:
-        return linear_bytes[int(wp.rint(_within_one(value) * 255.0))]
     return wp.max(value, 0.0)
 
 
@@ -150,7 +215,7 @@ def _within_one(value: float) -> float:
 
 def linear(encoded: np.ndarray) -> np.ndarray:
     """Return linear float32 values for 8-bit sRGB values, given as floats from 0 to 1 (IEC 61966-2-1)."""
-    return _linear_bytes()[np.rint(np.clip(encoded, 0.0, 1.0) * 255.0).astype(np.uint8)]
+    return _linear_bytes()[(np.clip(encoded, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)]
 
 
 @cache

@@ -122,8 +122,8 @@ def test_new_hair_has_them_where_nodes_read_them(modified):
 
 def test_nodes_are_not_looked_through_when_objects_move(modified, monkeypatch):
     hair, tree = modified
-    looks, real = [], guide_map_readers._are_in_nodes
-    monkeypatch.setattr(guide_map_readers, "_are_in_nodes", lambda: looks.append(1) or real())
+    looks, real = [], guide_map_readers._reading_of
+    monkeypatch.setattr(guide_map_readers, "_reading_of", lambda tree: looks.append(1) or real(tree))
     lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
     bpy.context.scene.collection.objects.link(lamp)
     update()

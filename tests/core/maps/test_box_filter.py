@@ -74,6 +74,36 @@ def test_the_changed_box_holds_all_changes(rng):
     assert pixels.changed_box(image, other) == (slice(3, 12), slice(5, 8))
 
 
+@pytest.mark.parametrize("shape", [(40, 64, 4), (37, 53, 1), (300, 7, 4), (1, 5, 2), (9, 130, 3)])
+def test_boxes_of_changed_parts_hold_all_changes(rng, shape):
+    """Digests find a change of any texel, also swaps, sign bits and constant colors."""
+    image = rng.random(shape).astype(np.float32)
+    before = pixels.digests(image)
+    assert pixels.box_of_changed_parts(before, pixels.digests(image.copy()), shape) is None
+    for _ in range(20):
+        other, row, column = image.copy(), *(rng.integers(0, side) for side in shape[:2])
+        some = other[row : row + rng.integers(1, 5), column : column + rng.integers(1, 5)]
+        some[:] = [some[::-1, ::-1].copy(), -some, some[:1, :1].copy(), rng.random()][rng.integers(0, 4)]
+        exact = pixels.changed_box(image, other)
+        found = pixels.box_of_changed_parts(before, pixels.digests(other), shape)
+        if exact is None:
+            assert found is None
+            continue
+        for mine, its in zip(found, exact, strict=True):
+            assert mine.start <= its.start and its.stop <= mine.stop
+        if shape[1] * shape[2] == 256:  # a part is a row
+            assert found[0] == exact[0]
+
+
+def test_digests_see_all_strokes_of_eight_bits():
+    """A part of one of 256 gray levels has another digest at each other level, and a moved texel changes a digest."""
+    levels = (np.arange(256, dtype=np.float32) / np.float32(255.0))[:, None, None]
+    assert len(np.unique(pixels.digests(np.broadcast_to(levels, (256, 64, 4))), axis=0)) == 256
+    moved = np.zeros((64, 64, 4), np.float32)
+    moved[np.arange(64), np.arange(64)] = 1.0
+    assert len(np.unique(pixels.digests(moved), axis=0)) == 64
+
+
 def test_a_constant_image_is_the_constant(rng):
     """An image of one value gives each root this value, bit for bit."""
     mesh, uvs = plane()

@@ -4,7 +4,7 @@
 import hashlib
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -21,16 +21,16 @@ pixel_cache = Cache(capacity=16)
 
 @dataclass(frozen=True, eq=False)
 class _Converted:
-    """Pixels of an image (H, W, C) in Blender, and the converted pixels; way: arguments of the conversion.
+    """`digests` of the pixels of an image (H, W, C) in Blender, and the converted pixels.
 
-    spare: an array of the same shape for the next read; before: the converted pixels before the last change; changed:
-    the box of that change.
+    raw: the array that these pixels were read into, for the next read; way: arguments of the conversion; before: the
+    converted pixels before the last change; changed: the box of that change.
     """
 
+    digests: np.ndarray
     raw: np.ndarray
     way: dict
     pixels: np.ndarray
-    spare: np.ndarray | None = None
     before: np.ndarray | None = None
     changed: tuple[slice, slice] | None = None
 
@@ -135,15 +135,16 @@ def _pixels_of(image, named, is_color, is_painted=False):
         return convert(_raw(image), **way)
     key = image.session_uid, is_color
     known = converted_cache.get(key)
-    raw = _raw(image, None if known is None else known.spare)
+    raw = _raw(image, None if known is None else known.raw)
+    digests = maps.pixels.digests(raw)
     if known is None or known.way != way or known.raw.shape != raw.shape:
-        return converted_cache.keep(key, _Converted(raw, way, convert(raw, **way))).pixels
-    changed = maps.pixels.changed_box(known.raw, raw)
+        return converted_cache.keep(key, _Converted(digests, raw, way, convert(raw, **way))).pixels
+    changed = maps.pixels.box_of_changed_parts(known.digests, digests, raw.shape)
     if changed is None:
-        return converted_cache.keep(key, replace(known, raw=raw, spare=known.raw)).pixels
+        return known.pixels
     found = _writable(known)
     found[changed] = convert(raw[changed], **way)
-    return converted_cache.keep(key, _Converted(raw, way, found, known.raw, known.pixels, changed)).pixels
+    return converted_cache.keep(key, _Converted(digests, raw, way, found, known.pixels, changed)).pixels
 
 
 def _writable(known):

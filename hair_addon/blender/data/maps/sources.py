@@ -45,7 +45,7 @@ def stored_strands(hair):
     surface_object = curves.grown_on(hair)
     if surface_object is not None:
         surface = scene.read_surface(surface_object, scene.last_depsgraph())
-        roots = stored_roots.points(hair, surface)
+        roots = _known_roots(hair, surface)
     identities = attributes.read(hair, "id", "INT", "CURVE")
     return Strands(
         hair,
@@ -56,6 +56,30 @@ def stored_strands(hair):
         curves.read_randoms(hair),
         attributes.read(hair, _CLUMP, "INT", "CURVE"),
     )
+
+
+def _known_roots(hair, surface):
+    """Return `stored_roots.points`: the known points if nothing has changed, so that painting does not check them."""
+    stored, known = stored_roots.stored(hair), root_cache.get(hair.session_uid)
+    if known is not None and _has_same_faces(known[0], surface) and all(map(_are_equal, known[1], stored)):
+        return known[2]
+    found = stored_roots.points_of(stored, surface)
+    if found is not None:
+        root_cache.keep(hair.session_uid, (surface, stored, found))
+    return found
+
+
+def _has_same_faces(surface, other):
+    """Whether a `Surface` is another one, possibly in another pose."""
+    return surface.mesh is other.mesh and surface.is_turned == other.is_turned
+
+
+def _are_equal(one, two):
+    return one is two or (one is not None and two is not None and np.array_equal(one, two))
+
+
+# session_uid of hair → (`Surface`, `stored_roots.stored`, `SurfacePoints`), which is compared.
+root_cache = Cache(capacity=4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +142,7 @@ class Source:
             if self.pixels.keys() != other.pixels.keys():
                 return False
             pairs += [(self.pixels[tile], other.pixels[tile]) for tile in self.pixels]
-        return all(
-            one is two or (one is not None and two is not None and np.array_equal(one, two)) for one, two in pairs
-        )
+        return all(_are_equal(one, two) for one, two in pairs)
 
     def _at_roots(self, roots):
         owned = self.corners[roots.triangle]
@@ -132,7 +154,7 @@ class Source:
         sizes = {tile: values.shape[1::-1] for tile, values in self.pixels.items()}
         key = self.hair_uid, self.settings.uv, tuple(sizes.items()), len(roots)
         known = texel_cache.get(key)
-        if known is None or not (known.roots.is_same(roots) and np.array_equal(known.corner_uvs, self.corners)):
+        if known is None or not (_are_same(known.roots, roots) and _are_equal(known.corner_uvs, self.corners)):
             texels = maps.box_filter.root_texels(self.surface.mesh, self.corners, roots, sizes)
             known = texel_cache.keep(key, _Known(roots, self.corners, sizes, texels))
         if set(self.pixels) != {None}:
@@ -250,6 +272,10 @@ def _as(values, is_color):
         return values
     is_gray = (values[:, 1:3] == values[:, :1]).all(axis=1, keepdims=True)
     return np.where(is_gray, values[:, :1], values[:, :3].mean(axis=1, keepdims=True)).astype(np.float32)
+
+
+def _are_same(roots, others):
+    return roots is others or roots.is_same(others)
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,19 +127,46 @@ def _looks(look, given, randoms):
     return strand_looks(look, varied, randoms)
 
 
-def write_looks(hair) -> list[HairError]:
-    """Store the looks of strands in their Curves, or remove them; returns errors about missing sources."""
+# session_uid of hair → `StrandLooks` that are newer than its Curves; cleared by undo.
+pending_cache = Cache()
+
+
+def write_looks(hair, is_soon: bool = False) -> tuple[StrandLooks | None, list[HairError]]:
+    """Store the looks of strands in their Curves, or remove them; returns the result of `looks_of`.
+
+    is_soon: `write_pending` stores them, as Blender takes longer to evaluate changed Curves than maps take to be read.
+    """
     looks, errors = looks_of(hair) if len(hair.curves) else (None, [])
+    pending_cache.invalidate(hair.session_uid)
     if looks is None:
         if has(hair):
             for name, _data_type in _LAYOUT:
                 hair.attributes.remove(hair.attributes[name])
         _write_radial(hair, None)
-        return errors
+    elif is_soon and has(hair) and has_radial(hair) == (looks.radial is not None):
+        pending_cache.keep(hair.session_uid, looks)
+    else:
+        _write(hair, looks)
+    return looks, errors
+
+
+def is_pending(hair) -> bool:
+    """Whether hair has looks that `write_looks` has left."""
+    return pending_cache.get(hair.session_uid) is not None
+
+
+def write_pending(hair) -> None:
+    """Store the looks that `write_looks` has left, unless the hair has other strands since."""
+    looks = pending_cache.get(hair.session_uid)
+    pending_cache.invalidate(hair.session_uid)
+    if looks is not None and len(looks) == len(hair.curves):
+        _write(hair, looks)
+
+
+def _write(hair, looks):
     for (name, data_type), values in zip(_LAYOUT, (looks.root, looks.tip, looks.roughness), strict=True):
         attributes.write(hair, name, data_type, "CURVE", values)
     _write_radial(hair, looks.radial)
-    return errors
 
 
 def _write_radial(hair, values):
@@ -160,11 +187,14 @@ def has_radial(hair) -> bool:
 
 
 def read_looks(hair) -> StrandLooks | None:
-    """Return the stored `StrandLooks` of Curves, possibly evaluated or linked; None without them. Invalid values are
-    0.
+    """Return the `StrandLooks` of Curves, possibly evaluated or linked, also if they are not stored yet; None without
+    looks. Invalid values are 0.
     """
     if not has(hair):
         return None
+    pending = pending_cache.get(hair.session_uid)
+    if pending is not None and len(pending) == len(hair.curves):
+        return pending
     found = [attributes.read(hair, name, data_type, "CURVE") for name, data_type in _LAYOUT]
     radial = attributes.read(hair, RADIAL, "FLOAT", "CURVE") if has_radial(hair) else None
     return StrandLooks(

@@ -22,14 +22,26 @@ def points(curves, surface, is_complete=False):
 
     Invalid roots are replaced by a triangle's corner. is_complete: return None if any root is invalid.
     """
-    triangle, barycentric = raw(curves)
+    return points_of(stored(curves), surface, is_complete)
+
+
+def stored(curves):
+    """Return the stored arrays that `points_of` takes: triangles, barycentric coordinates and vertices, each None if
+    missing.
+    """
+    return *raw(curves), _vertices(curves)
+
+
+def points_of(stored_arrays, surface, is_complete=False):
+    """`points` of the arrays from `stored`, which stay as they are."""
+    triangle, barycentric, vertices = stored_arrays
     if barycentric is None or triangle is None or not len(surface.mesh.triangles):
         return None
+    triangle, barycentric = triangle.copy(), barycentric.copy()
     # Curves that Sculpt Mode adds have zeros; on a surface that lost faces indices are out of range.
     known = are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
     triangle[~known] = 0
     found = surface.swap_winding(SurfacePoints(triangle, barycentric))
-    vertices = _vertices(curves)
     if vertices is not None:
         are_vertices = _all((vertices >= 0) & (vertices < len(surface.rest)))
         is_other = ~_all(vertices == surface.root_vertices(found))

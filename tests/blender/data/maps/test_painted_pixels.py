@@ -39,8 +39,8 @@ def test_strokes_convert_their_rows_alone(hair, rng, monkeypatch, is_color, is_f
     """A stroke over five rows converts five rows; earlier results keep their values, and all rows equal a new
     conversion.
     """
-    image = bpy.data.images.new("Painted", 24, 40, alpha=True, float_buffer=is_float)
-    values = rng.random((40, 24, 4), np.float32)
+    image = bpy.data.images.new("Painted", 64, 40, alpha=True, float_buffer=is_float)
+    values = rng.random((40, 64, 4), np.float32)
     image.pixels.foreach_set(values.ravel())
     before = image_pixels.read(image, is_color)[None]
     kept = before.copy()
