@@ -56,7 +56,7 @@ _COMPARED = {
     "geometry.faces": ("connected_components",),
     "geometry.search": ("counting_sort", "hash_grid"),
     "grooming": ("guide_growth",),
-    "interpolation": ("clump_centers", "guide_weights", "interpolation"),
+    "interpolation": ("clump_centers", "guide_weights", "interpolation", "sharp_edges"),
     "placement": ("exact_cells", "farthest", "preconditioner", "sampled_cells", "voronoi"),
     "styling": ("stack", "steps"),
 }

@@ -7,11 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hair_addon.core.geometry import strands
 from hair_addon.core.interpolation import sharp_edges
 from hair_addon.core.long_work import Stopped
-from hair_addon.core.styling import clump, clump_trees, program
+from hair_addon.core.styling import braid, clump, clump_trees, program
 from tests.support.dynamics.stepped import curved_strands, largest_move, stepped, straight_strands
-from tests.support.strands.styled import head
+from tests.support.strands.styled import head, straight
 
 FULL = clump.Settings(thickness=0.0, stray=0.0, root=1.0, tip=1.0, levels=1)
 
@@ -138,6 +139,30 @@ def test_a_strand_belongs_to_the_nearest_centre(hair):
         "sc,sc->s", hair.binding.normals.numpy(), bound.levels[1].binding.normals.numpy()[apart.argmin(axis=1)]
     )
     assert is_nearest.mean() > 0.98 and np.all(is_nearest | (facing < np.cos(sharp_edges.BEGIN)))
+
+
+@pytest.mark.parametrize("style", [clump.Settings(size=0.03, stray=0.0), braid.Settings(size=0.03)])
+def test_no_strand_is_drawn_across_a_parting(style):
+    """At a parting of 75° without a part line, strands of 20 cm are drawn across by up to 13 cm without the limits."""
+    parted = straight(600, 0.2, 0.2)
+    points = parted.guides.numpy()
+    middle = np.median(points[:, 0, 0])
+    side = np.sign(points[:, 0, 0] - middle)
+    directions = np.stack([side * np.sin(0.65), 0.0 * side, np.cos(0.65) + 0.0 * side], axis=1)
+    points = points[:, :1] + np.linspace(0.0, 0.2, 41)[:, None] * directions[:, None]
+    guides = strands.from_numpy(np.float32(points), parted.guides.roots)
+    plain, styled = (parted.styled(*styles, guides=guides)[:, :, 0] - middle for styles in ((), (style,)))
+    side = np.sign(plain[:, -1:])
+    assert np.all((side * styled).min(axis=1) > np.minimum((side * plain).min(axis=1), 0.0) - 1e-3)
+    assert np.abs(styled - plain).max() > 0.01
+
+
+def test_strands_of_a_lock_with_a_short_center_stay(rng):
+    """Hair next to a cut does not follow the extension of a short center."""
+    strands, centre = bundle(rng)
+    made = [stepped(strands, FULL, centres=centre[:, :1] + part * (centre - centre[:, :1])) for part in (0.3, 0.6)]
+    np.testing.assert_allclose(made[0], strands, atol=1e-6)
+    assert np.abs(made[1] - strands).max() > 1e-3
 
 
 def test_a_part_of_the_strands_crosses_over(hair):
