@@ -110,12 +110,6 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
     random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
     wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
-    # Reduced over strands first: NumPy is ten times faster along the long axis of a flat array.
-    flat = points.reshape(strand_count, -1)
-    bounds = np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
-    # A sample of the strands is enough for the level of detail.
-    some = slice(None, None, -(-strand_count // 1000))
-    mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
     uploaded = StrandsOnGPU(
         texture,
         *_radii_texture(radii, row_strands),
@@ -128,13 +122,43 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
         wetness,
         points,
         radii,
-        bounds,
-        mean_length,
-        float(radii[some].mean()),
+        _bounds_of(points),
+        _mean_length(points),
+        float(radii[_some(strand_count)].mean()),
         float(radii.max()),
         randoms,
     )
     return with_looks(uploaded, looks)
+
+
+def with_points(strands, points):
+    """`StrandsOnGPU` with other points (S, P, 3) float32 of as many strands; only these are uploaded."""
+    return replace(
+        strands,
+        texture=packed_texture(points, strands.row_strands),
+        points=points,
+        bounds=_bounds_of(points),
+        mean_length=_mean_length(points),
+        moved=None,
+        is_made=False,
+        has_points=True,
+        lengthenings={},
+    )
+
+
+def _some(strand_count):
+    """A sample of the strands, which is enough for the level of detail."""
+    return slice(None, None, -(-strand_count // 1000))
+
+
+def _mean_length(points):
+    return float(np.linalg.norm(np.diff(points[_some(len(points))], axis=1), axis=2).sum(axis=1).mean())
+
+
+def _bounds_of(points):
+    # Reduced over strands first: NumPy is ten times faster along the long axis of a flat array.
+    flat = points.reshape(len(points), -1)
+    return np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
 
 
 def with_looks(strands, looks):

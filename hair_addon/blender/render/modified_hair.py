@@ -44,9 +44,11 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
         known.is_current = True
         return known.on_gpu
     forget_deleted()
-    made = _Modified(
-        hair_object.session_uid, hair_object.data.session_uid, read.arrays, strand_textures.upload_strands(*read.arrays)
-    )
+    if known is not None and read_strands.have_same_details(read.arrays, known.arrays):
+        on_gpu = strand_textures.with_points(known.on_gpu, read.points)
+    else:
+        on_gpu = strand_textures.upload_strands(*read.arrays)
+    made = _Modified(hair_object.session_uid, hair_object.data.session_uid, read.arrays, on_gpu)
     return modified_cache.keep(hair_object.session_uid, made).on_gpu
 
 

@@ -63,14 +63,32 @@ def test_modifiers_may_change_the_number_of_strands(modified):
 def test_what_blender_did_not_evaluate_again_is_not_uploaded_again(modified, monkeypatch):
     drawn()
     uploads = []
-    real = strand_textures.upload_strands
-    monkeypatch.setattr(strand_textures, "upload_strands", lambda *given: uploads.append(1) or real(*given))
+    real = strand_textures.packed_texture
+    monkeypatch.setattr(strand_textures, "packed_texture", lambda *given: uploads.append(1) or real(*given))
     bpy.data.objects["Sphere"].name = "Ball"
     drawn()
     assert not uploads
     bend(modified.data.surface, 0.3)
     drawn()
     assert uploads
+
+
+def test_moved_points_are_all_that_is_uploaded(modified):
+    drawn()
+    strands = modified_hair.modified_cache.get(modified.session_uid).on_gpu
+    bend(modified.data.surface, 0.3)
+    is_evaluated(modified)
+    moved = modified_hair.modified_cache.get(modified.session_uid).on_gpu
+    assert moved.radii_texture is strands.radii_texture and moved.randoms is strands.randoms
+    assert moved.texture is not strands.texture
+    fresh = strand_textures.upload_strands(moved.points, moved.radii, moved.randoms_here, moved.wetness_here)
+    np.testing.assert_array_equal(np.array(moved.texture.read()), np.array(fresh.texture.read()))
+    assert moved.mean_length == fresh.mean_length
+    np.testing.assert_array_equal(moved.bounds, fresh.bounds)
+    modified.data.vellus.hair.radius *= 2.0
+    assert is_evaluated(modified).shape == moved.points.shape
+    wider = modified_hair.modified_cache.get(modified.session_uid).on_gpu
+    np.testing.assert_allclose(wider.greatest_radius, 2.0 * moved.greatest_radius, rtol=1e-5)
 
 
 def test_strands_of_removed_modifiers_and_deleted_objects_are_freed(modified):
