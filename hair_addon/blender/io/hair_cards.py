@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.cards import texels
-from ...core.cards.best_placement import best_placement
+from ...core.cards import best_placement, texels
 from ...core.cards.card_error import CardError, Comparison
 from ...core.cards.card_layout import CardStrands, Placement, laid_cards
 from ...core.cards.polygon_mesh import PolygonMesh
@@ -63,30 +62,32 @@ def making_cards(hair, settings, folder=None):
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
     strands = CardStrands(read.points, read.radii, read.colors(), read.surface)
-    comparison = None
+    comparison = of_trials = None
     if settings.error_measure != "OFF":
         comparison = yield lambda progress: Comparison(strands, progress)
+    if settings.error_measure == "MINIMIZED":
+        of_trials = yield lambda progress: Comparison(strands, progress, best_placement.SAMPLES)
     levels = settings.levels(len(read.points))
     areas = np.cumsum([0] + [level.texture_size**2 for level in levels])
     parts = (areas / areas[-1]).tolist()
     drawn = []
     for index, level in enumerate(levels):
-        drawn.append((yield from _drawing(strands, comparison, level, settings, parts[index : index + 2])))
+        drawn.append((yield from _drawing(strands, comparison, of_trials, level, settings, parts[index : index + 2])))
     joints = yield lambda _progress: read.joints(settings)
     return _written(read, drawn, joints, folder, settings.texture_layout)
 
 
-def _drawing(strands, comparison, level, settings, parts):
+def _drawing(strands, comparison, of_trials, level, settings, parts):
     """Draw a level, as work in steps.
 
-    comparison: with the strands, None for no error; parts: (first, last) of the total progress.
+    comparison, of_trials: with the strands, None for no error or no trials; parts: (first, last) of the total progress.
     """
     first, last = parts
     middle = first + 0.1 * (last - first)
     choice = settings, Placement()
-    if settings.error_measure == "MINIMIZED":
-        choice = yield lambda progress: best_placement(
-            comparison, strands, level, settings, part_of(progress, first, middle)
+    if of_trials is not None:
+        choice = yield lambda progress: best_placement.best_placement(
+            of_trials, strands, level, settings, part_of(progress, first, middle)
         )
     laid = yield lambda progress: laid_cards(strands, level, *choice, part_of(progress, first, middle))
     placed = laid.strands

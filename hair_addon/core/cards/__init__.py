@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         best_placement,
         bone_chains,
         card_error,
+        card_exchange,
         card_layout,
         card_settings,
         card_views,

@@ -33,6 +33,16 @@ class CardError:
         return 0.5 * (self.coverage + self.flip)
 
 
+@dataclass(frozen=True)
+class CardShares:
+    """Shares of N cards in the six views: errors (N,) of the pixels that they or their strands are seen in, and seen
+    (N,), the number of samples in which they are visible.
+    """
+
+    errors: np.ndarray
+    seen: np.ndarray
+
+
 class Comparison:
     """Views of strands, with which cards are compared; samples: along each side of a view, a multiple of 128."""
 
@@ -46,6 +56,27 @@ class Comparison:
     def error_of(self, mesh: PolygonMesh, maps: dict[str, np.ndarray]) -> CardError:
         """Return the `CardError` of cards with textures of `TexelSums.maps`."""
         return card_error(self._views, self._sides.of_cards(mesh, maps))
+
+    def shares_of(
+        self, mesh: PolygonMesh, maps: dict[str, np.ndarray], segment_count: int, labels: np.ndarray
+    ) -> tuple[CardError, CardShares]:
+        """Return the `CardError` and the `CardShares` of cards with `segment_count` quads each.
+
+        labels: (S,) the card of each strand, -1 without one.
+        """
+        views = list(self._sides.of_cards(mesh, maps))
+        count = (len(mesh.faces.starts) - 1) // segment_count
+        errors, seen = np.zeros(count), np.zeros(count)
+        for one, other in zip(self._views, views, strict=True):
+            step = len(one.seen) // PIXELS[0]
+            error = np.kron(_pixel_errors(one.pixels(PIXELS[0]), other.pixels(PIXELS[0])), np.ones((step, step)))
+            is_card, is_strand = other.seen >= 0, one.seen >= 0
+            cards, of_strands = other.seen[is_card] // segment_count, labels[one.seen[is_strand]]
+            seen += np.bincount(cards, minlength=count)
+            errors += np.bincount(cards, error[is_card], count)
+            on_card = of_strands >= 0
+            errors += np.bincount(of_strands[on_card], error[is_strand][on_card], count)
+        return card_error(self._views, views), CardShares(errors, seen)
 
 
 def card_error(strands: Iterable[View], cards: Iterable[View]) -> CardError:
@@ -61,11 +92,20 @@ def card_error(strands: Iterable[View], cards: Iterable[View]) -> CardError:
 
 def _error(one, other):
     """Return (coverage, flip) errors of two pictures of one side and distance."""
+    total = max(np.maximum(one[1], other[1]).sum(), 1e-12)
+    return tuple(errors.sum() / total for errors in _parts(one, other))
+
+
+def _pixel_errors(one, other):
+    """Return the sum (n, n) of the errors of coverage and FLIP of each pixel."""
+    return sum(_parts(one, other))
+
+
+def _parts(one, other):
+    """Return the errors (n, n) of coverage and FLIP in each pixel."""
     (_, covered), (_, other_covered) = one, other
-    either = np.maximum(covered, other_covered)
-    total = max(either.sum(), 1e-12)
     visible = flip(_shown(*one), _shown(*other))
-    return np.abs(covered - other_covered).sum() / total, (visible * either).sum() / total
+    return np.abs(covered - other_covered), visible * np.maximum(covered, other_covered)
 
 
 def _shown(colors, coverage):

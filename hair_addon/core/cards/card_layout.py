@@ -21,16 +21,35 @@ _AT_ONCE = 100_000  # pairs of lines in a batch
 _TINY = 1e-6  # [m]
 
 
+@dataclass(frozen=True, eq=False)
+class Clumps:
+    """The division of S strands into clumps, each with a card.
+
+    labels: (S,) int32 clump of each strand, -1 for flyaways; every clump has strands; crossed: (K,) ascending indices
+    of the clumps with a second card.
+    """
+
+    labels: np.ndarray
+    crossed: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """Number of clumps."""
+        return int(self.labels.max()) + 1
+
+
 @dataclass(frozen=True)
 class Placement:
     """Parameters of the placement of cards; the error measure chooses among several.
 
     outward: weight of facing away from the surface, relative to following the spread of a clump; tip: weight of the
-    distances between tips in the division into clumps, relative to those between roots.
+    distances between tips in the division into clumps, relative to those between roots; clumps: in place of those of
+    `clumps_of`.
     """
 
     outward: float = 2.0
     tip: float = 1.0
+    clumps: Clumps | None = None
 
 
 @dataclass(frozen=True)
@@ -76,7 +95,7 @@ def laid_cards(
 
     settings: number of pictures, and parts of the cards that are crossed, flyaways or caps.
     """
-    pieces = _pieces(strands.points, strands.surface, level, settings, placement, progress)
+    pieces = _pieces(strands, level, settings, placement, progress)
     progress("Making cards", 1.0)
     shown = [_cut(values[pieces.strands], pieces.reaches) for values in _of_points(strands)]
     lines, widths, shades = shown[0], shown[1][..., 0], shown[2]
@@ -100,26 +119,51 @@ def _of_points(strands):
     return strands.points, strands.radii[..., None], strands.colors
 
 
-def _pieces(points, surface, level, settings, placement, progress):
-    """Return the `_Pieces` of strands on clumps, crossed cards, flyaways and cards on the surface, in this order."""
+def clumps_of(
+    strands: CardStrands,
+    level: Level,
+    settings: CardSettings,
+    placement: Placement,
+    progress: Progress = no_progress,
+) -> Clumps:
+    """Return the clumps of similar strands for the cards of a level; the thickest ones are crossed."""
+    points = strands.points
     crossed, flyaways, caps = settings.parts_of(level.card_count)
-    clump_count = level.card_count - crossed - flyaways - caps
+    count = level.card_count - crossed - flyaways - caps
     features = clusters.strand_features(points)
     features[:, 3:] *= np.linspace(1.0, placement.tip, 4)[1:].repeat(3).astype(np.float32)
-    everywhere = np.arange(len(points))
-    loose = _outermost(points, features, clump_count, flyaways) if flyaways else everywhere[:0]
+    labels, everywhere = np.full(len(points), -1, np.int32), np.arange(len(points))
+    loose = _outermost(points, features, count, flyaways) if flyaways else everywhere[:0]
     inner = np.setdiff1d(everywhere, loose)
-    labels = clusters.clusters(features[inner], clump_count, progress)
-    axes = ribbons.axes_of(points[inner], labels, clump_count, level.segment_count, surface, placement.outward)
-    parts = [(inner, labels, axes, 1.0)]
+    labels[inner] = clusters.clusters(features[inner], count, progress)
+    thickest = everywhere[:0]
     if crossed:
-        parts.append(_second(points, parts[0], crossed))
-    if flyaways:
-        parts.append(_ribbons(points, loose, np.arange(flyaways), level, surface, 1.0))
+        axes = _axes(points, Clumps(labels, thickest), level, strands.surface, placement)
+        thickest = _thickest(points[inner], labels[inner], axes, crossed)
+    return Clumps(labels, thickest)
+
+
+def _axes(points, clumps, level, surface, placement):
+    inner = clumps.labels >= 0
+    parts = points[inner], clumps.labels[inner], clumps.count, level.segment_count
+    return ribbons.axes_of(*parts, surface, placement.outward)
+
+
+def _pieces(strands, level, settings, placement, progress):
+    """Return the `_Pieces` of strands on clumps, crossed cards, flyaways and cards on the surface, in this order."""
+    points, surface = strands.points, strands.surface
+    caps = settings.parts_of(level.card_count)[2]
+    clumps = placement.clumps or clumps_of(strands, level, settings, placement, progress)
+    inner, loose = (np.flatnonzero(chosen) for chosen in (clumps.labels >= 0, clumps.labels < 0))
+    parts = [(inner, clumps.labels[inner], _axes(points, clumps, level, surface, placement), 1.0)]
+    if len(clumps.crossed):
+        parts.append(_second(parts[0], clumps.crossed))
+    if len(loose):
+        parts.append(_ribbons(points, loose, np.arange(len(loose)), level, surface, 1.0))
     if caps:
         roots = _cut(points, np.full(len(points), _CAP_REACH))
         of_caps = clusters.clusters(clusters.strand_features(roots), caps)
-        parts.append(_ribbons(roots, everywhere, of_caps, level, surface, _CAP_REACH))
+        parts.append(_ribbons(roots, np.arange(len(points)), of_caps, level, surface, _CAP_REACH))
     firsts = np.cumsum([0] + [len(part[2].centres) for part in parts])
     return _Pieces(
         np.concatenate([part[0] for part in parts]),
@@ -184,16 +228,20 @@ def _distances(line, lines):
     return np.linalg.norm(line - lines, axis=-1).mean(axis=-1)
 
 
-def _second(points, part, count):
-    """Return (strands, labels, axes, reach) of cards at a right angle to the cards of the thickest clumps."""
-    strands, labels, axes, reach = part
-    flat = ribbons.flattened(points[strands], labels, axes).astype(np.float64)
+def _thickest(points, labels, axes, count):
+    """Return the ascending indices (count,) of the clumps with the most spread along the normals of their cards."""
+    flat = ribbons.flattened(points, labels, axes).astype(np.float64)
     thickness = clusters.cluster_means((flat[..., 2] ** 2).mean(axis=1), labels, len(axes.centres))
-    crossed = np.argsort(-thickness, kind="stable")[:count]
+    return np.sort(np.argsort(-thickness, kind="stable")[:count])
+
+
+def _second(part, crossed):
+    """Return (strands, labels, axes, reach) of cards at a right angle to those of clumps; crossed: their indices."""
+    strands, labels, axes, reach = part
     card = np.full(len(axes.centres), -1)
-    card[crossed] = np.arange(count)
+    card[crossed] = np.arange(len(crossed))
     members = np.flatnonzero(card[labels] >= 0)
-    turned = axes.chosen(crossed).turned(np.full(count, 0.5 * np.pi))
+    turned = axes.chosen(crossed).turned(np.full(len(crossed), 0.5 * np.pi))
     return strands[members], card[labels[members]], turned, reach
 
 

@@ -31,10 +31,14 @@ _SIDES = np.array(
 
 @dataclass(frozen=True)
 class View:
-    """A picture from one side: linear colors (n, n, 3) times coverage, and coverage (n, n), of the finest pixels."""
+    """A picture from one side: linear colors (n, n, 3) times coverage, and coverage (n, n), of the finest pixels.
+
+    seen: (samples, samples) index of the strand, or of the quad of cards, in each sample, or `NONE`.
+    """
 
     colors: np.ndarray
     coverage: np.ndarray
+    seen: np.ndarray
 
     def pixels(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the colors and the coverage of `count`² pixels, each the mean of some of the finest pixels."""
@@ -70,7 +74,8 @@ class Sides:
             lengths = np.maximum(np.linalg.norm(edges, axis=1), 1e-12)
             # The normal that faces the viewer.
             facing = np.sqrt(np.clip(1.0 - (edges @ axes[2] / lengths) ** 2, 0.0, 1.0))
-            yield _view(seen, 0.5 * (colors[strand, piece] + colors[strand, piece + 1]), facing)
+            shades = 0.5 * (colors[strand, piece] + colors[strand, piece + 1])
+            yield _view(seen, shades, facing, 2 * pieces)
 
     def of_cards(self, mesh: PolygonMesh, maps: dict[str, np.ndarray]) -> Iterator[View]:
         """Yield the `View` of cards from each side; mesh: of quads; maps: textures of `TexelSums.maps`."""
@@ -89,7 +94,7 @@ class Sides:
             column, row = texels.T
             normals = 2.0 * maps["normal"][row, column] - 1.0
             facing = np.abs(np.einsum("ni,nij,j->n", normals, frames[triangle], axes[2]))
-            yield _view(seen, maps["color"][row, column], np.minimum(facing, 1.0))
+            yield _view(seen, maps["color"][row, column], np.minimum(facing, 1.0), 2)
 
     def _placed(self, corners, axes):
         """Return corners (T, 3, 3) in samples and depths of a side."""
@@ -119,15 +124,19 @@ def strand_triangles(points: np.ndarray, radii: np.ndarray, toward: np.ndarray) 
     return quads[:, :, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
 
 
-def _view(seen, colors, facing):
-    """Return the `View` of samples: visible triangles (N, N), and colors (M, 3) and facing (M,) of those with hair."""
+def _view(seen, colors, facing, per_item):
+    """Return the `View` of samples: visible triangles (N, N), and colors (M, 3) and facing (M,) of those with hair.
+
+    per_item: number of triangles of a strand, or of a quad.
+    """
     count, per_side = PIXELS[0], len(seen) // PIXELS[0]
     row, column = np.nonzero(seen >= 0)
     pixel = (row // per_side) * count + column // per_side
     lit = (_AMBIENT + (1.0 - _AMBIENT) * facing) / per_side**2
     sums = [np.bincount(pixel, colors[:, channel] * lit, count**2) for channel in range(3)]
     coverage = np.bincount(pixel, minlength=count**2) / per_side**2
-    return View(np.stack(sums, axis=-1).reshape(count, count, 3), coverage.reshape(count, count))
+    items = np.where(seen >= 0, seen // per_item, NONE).astype(np.int32)
+    return View(np.stack(sums, axis=-1).reshape(count, count, 3), coverage.reshape(count, count), items)
 
 
 def _tangent_frames(corners, uvs):

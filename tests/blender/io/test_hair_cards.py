@@ -216,6 +216,7 @@ def test_the_error_of_cards_is_reported_and_can_be_minimized(hair, monkeypatch):
     """Cards have their error as properties, less of it with a chosen placement, for the same number of triangles."""
     for name, values in (("_CROSSED", (1.0,)), ("_OUTWARD", ()), ("_TIP", ())):
         monkeypatch.setattr(best_placement, name, values)
+    monkeypatch.setattr(best_placement, "MOST_EXCHANGES", 2)
     settings = {"card_count": 60, "segment_count": 3, "texture_size": SIZE}
     (plain,) = api.make_hair_cards(hair, **settings)
     assert "flip_error" not in plain

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from hair_addon.core.cards import best_placement, card_views
-from hair_addon.core.cards.card_error import Comparison, card_error
-from hair_addon.core.cards.card_layout import CardStrands, Placement
+from hair_addon.core.cards.card_error import CardShares, Comparison, card_error
+from hair_addon.core.cards.card_exchange import exchanged
+from hair_addon.core.cards.card_layout import CardStrands, Clumps, Placement, clumps_of
 from hair_addon.core.cards.card_settings import CardSettings, Level
 from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.long_work import no_progress
 from tests.core.cards.conftest import sphere, wavy_hair
 from tests.support.pairs import share_of_rows
 
@@ -88,7 +90,7 @@ def test_crossed_cards_have_less_error_than_as_many_single_cards(comparison, str
 
 @pytest.mark.long
 def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, strands, monkeypatch):
-    """The best placement has at most the error of the default one, for the same number of cards."""
+    """The best placement has at most the error of every trial, for the same number of cards."""
     monkeypatch.setattr(best_placement, "_TIP", ())
     monkeypatch.setattr(best_placement, "_OUTWARD", (0.5,))
     tried = []
@@ -100,11 +102,51 @@ def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, stra
     measure = best_placement.placement_error
     monkeypatch.setattr(best_placement, "placement_error", measured)
     settings = CardSettings(card_count=40)
-    best = best_placement.best_placement(comparison, strands, LEVEL, settings, lambda _step, _part: None)
+    best = best_placement.best_placement(comparison, strands, LEVEL, settings, no_progress)
     least = min(tried, key=lambda trial: trial[1].mean)
-    assert best == least[0] and least[1].mean < 0.9 * tried[0][1].mean
+    found = measure(comparison, strands, LEVEL, *best).mean
+    assert best[0] == least[0][0] and found <= least[1].mean < 0.9 * tried[0][1].mean
+    assert best[1].clumps.count + len(best[1].clumps.crossed) == 40
     assert tried[0][0] == (settings, Placement()) and len(tried) == 4
     tried.clear()
     given = CardSettings(card_count=40, crossed=0.25)
-    best = best_placement.best_placement(comparison, strands, LEVEL, given, lambda _step, _part: None)
+    best = best_placement.best_placement(comparison, strands, LEVEL, given, no_progress)
     assert best[0] == given and len(tried) == 2  # the settings determine the crossed cards
+
+
+def test_shares_of_cards_add_up_to_the_samples_that_are_seen(comparison, strands):
+    """Every sample with hair counts for one card, and cards beside the strands themselves have no error."""
+    clumps = clumps_of(strands, LEVEL, CardSettings(crossed=0.3), Placement())
+    mesh, maps = best_placement._drawn(strands, LEVEL, CardSettings(), Placement(clumps=clumps))
+    error, shares = comparison.shares_of(mesh, maps, LEVEL.segment_count, clumps.labels)
+    assert error == comparison.error_of(mesh, maps)
+    sides = card_views.Sides(strands.points, strands.surface, SAMPLES)
+    assert shares.seen.sum() == sum(np.count_nonzero(view.seen >= 0) for view in sides.of_cards(mesh, maps))
+    assert len(shares.seen) == LEVEL.card_count and (shares.errors >= 0.0).all() and shares.errors.sum() > 0.0
+
+
+def test_exchanges_give_cards_of_hidden_clumps_to_those_with_errors():
+    """A hidden clump joins the most similar one that stays, and the clump with the largest error is divided."""
+    features = (
+        np.repeat(np.arange(5.0, dtype=np.float32), 4)[:, None] + np.tile(np.float32([0.0, 0.0, 0.2, 0.2]), 5)[:, None]
+    )
+    clumps = Clumps(np.arange(5, dtype=np.int32).repeat(4), np.array([0]))
+    shares = CardShares(np.array([5.0, 1.0, 1.0, 1.0, 1.0, 5.0]), np.array([9.0, 9.0, 9.0, 0.0, 8.0, 9.0]))
+    found = exchanged(features, clumps, shares, 1)
+    joined = found.labels.reshape(5, 4)
+    assert len(set(joined[3]) | set(joined[4])) == 1 or len(set(joined[3]) | set(joined[2])) == 1
+    assert joined[0, 0] == joined[0, 1] != joined[0, 2] == joined[0, 3]
+    assert found.count + len(found.crossed) == 6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_exchanges_keep_the_number_of_cards_and_flyaways(seed):
+    rng = np.random.default_rng(seed)
+    features, count = rng.random((60, 12), np.float32), 12
+    labels = np.concatenate([np.arange(count), rng.integers(0, count, 48)]).astype(np.int32)
+    labels[50:] = -1
+    clumps = Clumps(labels, np.sort(rng.permutation(count)[:5]))
+    for most in (1, 3, 8):
+        clumps = exchanged(features, clumps, CardShares(*rng.random((2, 17))), most)
+        assert clumps.count + len(clumps.crossed) == 17 and set(clumps.crossed) <= set(range(clumps.count))
+        assert np.bincount(clumps.labels[:50], minlength=clumps.count).min() > 0 and (clumps.labels[50:] == -1).all()
