@@ -174,6 +174,30 @@ def test_push_outside_moves_guides_that_are_inside(guides):
     assert low.min() > 1.04
 
 
+@pytest.mark.parametrize("has_layer", [False, True])
+def test_new_guides_stay_outside(sphere, has_layer):
+    """New guides between few guides that lie around a ball do not pass through it; without the push, by half of it."""
+    bpy.ops.vellus.distribute_guides(guide_count=6)
+    guides = bpy.data.objects["Guides"]
+    shape = points(guides)
+    turns = np.linspace(0.0, 1.5, shape.shape[1])[None, :, None]
+    across = np.cross(shape[:, 0], [0.0, 0.0, 1.0])
+    around = np.cross(shape[:, 0], across / np.linalg.norm(across, axis=1, keepdims=True))
+    lying = 1.01 * (np.cos(turns) * shape[:, :1] + np.sin(turns) * around[:, None])
+    lying[:, 0] = shape[:, 0]
+    write_points(guides, lying.astype(np.float32))
+    bpy.context.view_layer.update()
+    if has_layer:
+        api.add_layer(guides)
+    before = points(guides)
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.change_guide_count(factor=5.0)
+    bpy.context.view_layer.update()
+    after = points(guides)
+    assert len(after) == 30 and np.array_equal(after[:6], before)
+    assert depths(after[6:]).max() < 1e-4
+
+
 def test_undone_guides_are_not_pushed(guides):
     guides.data.vellus.keeps_outside = False
     bpy.ops.ed.undo_push(message="off")

@@ -22,7 +22,7 @@ from ...layers import carried_layers
 from ...layers.carried_layers import LayersBefore
 from ...settings import preferences
 from .. import pipeline
-from . import guide_tools
+from . import guide_tools, outside_guides
 from .guide_tools import CombedGuides
 
 # Points (M, P, 3) [m], guides (M,) whose attributes are copied, and roots.
@@ -47,6 +47,8 @@ def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgrap
             base = guides.surface.to_local(_between(bare, roots, depsgraph)[0])
             layers = [carried_layers.between(guides.surface, before, roots, base)]
         write(guides, [(*_between(guides, roots, depsgraph), roots)], np.zeros(0, np.int64), before, layers)
+        if datablock.vellus.keeps_outside:
+            outside_guides.push_new(datablock, guides.local, depsgraph)
     elif difference < 0:
         write(guides, [], _crowded(guides, -difference, depsgraph), before)
     return len(datablock.curves)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides kept outside of their surface as it is posed: after each event of a stroke, and by Push Outside.
+"""Guides kept outside of their surface as it is posed: after each event of a stroke, when
+guides are added, and by Push Outside.
 
 Points are pushed out from root to tip; roots and segment lengths do not change. All surfaces are scaled to the size of
 a head, so that tolerances do not depend on the units of a scene.
@@ -14,7 +15,7 @@ from ....core import dynamics, grooming
 from ....core.errors import HairError
 from ....core.geometry import mesh as mesh_math
 from ....core.grooming.guide_tool_settings import OutsideSettings
-from ...data.strands import curves, frozen_points, posed_strands
+from ...data.strands import attributes, curves, frozen_points, posed_strands
 from ...data.surfaces import Surface
 from ...host.caches import Cache
 from . import guide_tools
@@ -50,6 +51,17 @@ def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> 
         pushed = np.where((weights < 1.0)[:, None, None], partly, pushed)
         after[places[is_moved]] = pushed[is_moved]
     return guide_tools.write_shapes(guides, after)
+
+
+def push_new(datablock: Curves, former: np.ndarray, depsgraph: Depsgraph) -> None:
+    """Push guides outside that were added after guides with local points (N, 3): between guides on opposite sides of a
+    head, guides would pass through it.
+    """
+    points = curves.read_points(datablock)
+    pushed = pushed_out(datablock, points[: len(former)], points, depsgraph)
+    if pushed is not points:
+        attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", pushed)
+        datablock.update_tag()
 
 
 def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgraph: Depsgraph) -> np.ndarray:
