@@ -22,6 +22,7 @@ STATE = {
     "blender/live/handlers.py: _is_undone": "the first update after an undo",
     "blender/live/hidden_previews.py: _handles": "unregister",
     "blender/render/frames/engine.py: _listener": "listening, a context",
+    "blender/render/late_layers.py: _jobs": "the end of each thread, at the latest unregister",
     "blender/render/viewport/live_light.py: _jobs": "the end of each share, at the latest unregister",
     "blender/render/viewport/viewport.py: _handles": "unregister",
     "blender/ui/brush_circle.py: _held": "the end of changing a brush by the mouse, on every way out",

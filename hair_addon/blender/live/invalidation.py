@@ -26,7 +26,7 @@ from ..groom.surfaces import edited_faces
 from ..groom.systems import copied_hair
 from ..host import background_process, notices
 from ..layers import recording
-from ..render import hair_cache, modified_hair, solid_hair
+from ..render import hair_cache, late_layers, modified_hair, solid_hair
 from ..render.frames import composite
 from ..render.viewport import guide_lines, live_light, region_pictures, viewport
 from ..settings import animated
@@ -46,6 +46,7 @@ COPIES = (
     hair_cache.strand_cache,
     hair_cache.pose_cache,
     modified_hair.modified_cache,
+    late_layers.request_cache,
     viewport.view_cache,
     bindings.binding_cache,
     bindings.kept_cache,
@@ -123,6 +124,7 @@ OTHERS = (
     picture_jobs.job_cache,
     picture_jobs.last_cache,
     guide_lines.hue_cache,
+    late_layers.layer_cache,
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs
@@ -141,6 +143,7 @@ def data_replaced():
 def clear():
     """Clear all caches except programs, when another file is opened or the add-on is disabled."""
     live_light.end()
+    late_layers.end()
     for cache in COPIES + OTHERS:
         cache.clear()
 
@@ -149,5 +152,6 @@ def end():
     """Clear all caches and programs when Python ends, while the GPU context still exists."""
     background_process.end()
     live_light.end()
+    late_layers.end()
     for cache in CACHES:
         cache.clear()

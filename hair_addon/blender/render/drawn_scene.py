@@ -25,6 +25,7 @@ from ..gpu import (
 from ..gpu import lights as blender_lights
 from ..gpu.programs import surface_programs, uniforms
 from ..gpu.shadows import ShadowMaps
+from ..host import running
 from ..host.notices import can_be_drawn
 from . import gpu_strands, hair_cache, hair_places, modified_hair, motion_vectors, read_strands, solid_hair
 
@@ -538,7 +539,8 @@ def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
         places = modified_hair.places(hair_object, depsgraph) if is_modified else hair_cache.places_of(datablock)
         tints = solid_hair.strand_tints(shown, hair_object, depsgraph, strands, places)
     is_neutral = tints is not None or solid_hair.is_tinted(shown)
-    shading = hair_cache.shading_of(datablock, strands, is_neutral)
+    waits = not (is_viewport and running.has_window())
+    shading = hair_cache.shading_of(datablock, strands, is_neutral, waits)
     return strands, solid_hair.shown_as(shading, shown, hair_object, tints)
 
 

@@ -25,7 +25,7 @@ from ..groom import bindings, strand_thickness
 from ..host import notices, paths
 from ..host.caches import Cache
 from ..settings import preferences, properties, shared_wetness
-from . import gpu_strands, read_strands, refused_strands
+from . import gpu_strands, late_layers, read_strands, refused_strands
 from .refused_strands import Refused
 
 # Number of cached tables: those of one groom, and of the last few positions of a slider.
@@ -363,20 +363,22 @@ def _shown_strands(datablock):
 
 
 @memory_as_sentence()
-def shading_of(datablock, strands=None, is_neutral=False):
+def shading_of(datablock, strands=None, is_neutral=False, waits=True):
     """Return the `Shading` of a hair Curves datablock, or a `MixedShading` if strands differ in wetness. Raises
     `HairError`.
 
-    strands: its `StrandsOnGPU`; is_neutral: of strands to be tinted, in place of the look's color.
+    strands: its `StrandsOnGPU`; is_neutral: of strands to be tinted, in place of the look's color; waits: whether all
+    tables are needed now, or may follow as of `late_layers`.
     """
     if is_neutral:
         return _neutral_shading_of(datablock)
     state, looks = datablock.vellus, None if strands is None else strands.looks_here
-    wettest = _shading_of_look(state, properties.look_of(state), looks)
+    uid = datablock.session_uid
+    wettest = _shading_of_look(state, properties.look_of(state), looks, None if waits else (uid, "wettest"))
     least, most = shared_wetness.of_hair(state)
     if strands is None or strands.wetness is None or least == most:
         return wettest
-    driest = _shading_of_look(state, properties.dry_look_of(state), looks)
+    driest = _shading_of_look(state, properties.dry_look_of(state), looks, None if waits else (uid, "driest"))
     return hair_shading.mixed(driest, wettest, strands.wetness_here, (least, most))
 
 
@@ -386,10 +388,11 @@ def _neutral_shading_of(datablock):
     return _cached_shading((settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, "")))
 
 
-def _shading_of_look(state, look, looks=None):
+def _shading_of_look(state, look, looks=None, purpose=None):
+    """Return the `Shading` of a look; purpose: as of `late_layers.tables` if tables may follow."""
     variation = appearance.strand_settings(look)
     if looks is not None:
-        return _shading_of_looks(state, look, look_tables.variation_of(variation), looks)
+        return _shading_of_looks(state, look, look_tables.variation_of(variation), looks, purpose)
     if state.model == "KAJIYA_KAY":
         if variation.is_even:
             return _cached_shading((appearance.kajiya_kay_settings(look),), hair_shading.kajiya_kay_shading)
@@ -404,7 +407,7 @@ def _shading_of_look(state, look, looks=None):
     return _cached_shading((settings, variation), _strand_shading)
 
 
-def _shading_of_looks(state, look, variation, looks):
+def _shading_of_looks(state, look, variation, looks, purpose):
     """Return the `Shading` of strands with `StrandLooks`."""
     some = strand_looks.sample_sigma_a(look, looks)
     if state.model == "KAJIYA_KAY":
@@ -416,8 +419,14 @@ def _shading_of_looks(state, look, variation, looks):
     if looks.radial_range is None or settings.mode != "energy":  # the classic model has no radial roughness
         return _cached_shading((settings, variation, covered), _look_shading)(some)
     layers = radial_tables.covering(*looks.radial_range)
-    settings = replace(settings, radial_roughness=layers.low)
-    return _cached_shading((settings, variation, covered, layers), _radial_shading)(some, looks.some.radial)
+    settings, radial = replace(settings, radial_roughness=layers.low), looks.some.radial
+    if purpose is not None and shading_cache.get((settings, variation, covered, layers)) is None:
+        mean, device = float(radial.mean()), preferences.device()
+        tables, key = late_layers.tables(purpose, settings, variation, covered, layers, mean, device)
+        shaded = shading_cache.get(key, lambda: hair_shading.marschner_look_shading(tables))
+        return shaded(some, radial) if isinstance(tables, radial_tables.RadialTables) else shaded(some)
+    late_layers.forget(purpose)
+    return _cached_shading((settings, variation, covered, layers), _radial_shading)(some, radial)
 
 
 def _look_shading(settings, variation, covered):

@@ -21,7 +21,7 @@ from ...host import scene_time
 from ...host.caches import Cache
 from ...host.engines import ENGINE
 from ...host.notices import say
-from .. import drawn_scene, hair_cache
+from .. import drawn_scene, hair_cache, late_layers
 from . import guide_lines, hair_picture, live_light, region_pictures, selected_hair
 from .outline import HairOutline
 
@@ -173,6 +173,8 @@ def hair_at(context, x, y):
 
 def drawn_scene_of(context):
     """Return the `DrawnScene` of the context's viewport, read if something has moved."""
+    if late_layers.has_new():
+        invalidate(is_hair_only=True)
     viewport = context.space_data
     shading = viewport_shading.read(viewport, context.scene, matrices_of(context.region_data)[0])
     key, shows = viewport.as_pointer(), (is_ours(context), *_visibility_key(viewport), shading.strands)

@@ -8,7 +8,9 @@ from ....core.shading.appearance import Appearance
 from ....core.shading.presets import PRESETS
 from ...groom.selection import active_of_kind, hair_of, object_of
 from ...groom.systems.diagnostics import modifier_notes
+from ...render import late_layers
 from ...settings import saved_looks
+from ...settings.translations import interface_text
 from .. import look_previews, picture_menus
 from ..setting_rows import others, row, rows
 from .preset_menu import PresetMenu
@@ -57,6 +59,9 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         layout = split(self.layout)
         state = hair_of(context.object).vellus
         write_status(layout, context, state, "shading_status")
+        if (baked := late_layers.parts()) is not None:
+            note = "Radial roughness in viewports is approximate: {done} of {count} tables are baked."
+            write(layout, context, interface_text(note, done=baked[0], count=baked[1]), "INFO")
         row(layout, state, "is_drawn")
         for note in modifier_notes(_hair_object(context)):
             write(layout, context, note, "INFO")

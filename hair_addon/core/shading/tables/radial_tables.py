@@ -79,6 +79,11 @@ def covering(least: float, greatest: float) -> Layers:
     return Layers(low, _STEP, round((high - low) / _STEP) + 1.0)
 
 
+def values_of(layers: Layers) -> list[float]:
+    """Return the radial roughness of each layer."""
+    return [float(value) for value in layers.low + layers.step * np.arange(round(layers.count))]
+
+
 def bake(
     settings: lookup_tables.Settings,
     variation: strand_variation.Settings,
@@ -87,6 +92,5 @@ def bake(
     device: str = "cpu",
 ) -> RadialTables:
     """Bake `RadialTables`; arguments as for `look_tables.bake`; the radial roughness of the settings has no effect."""
-    radial = layers.low + layers.step * np.arange(round(layers.count))
-    every = (replace(settings, radial_roughness=float(each)) for each in radial)
+    every = (replace(settings, radial_roughness=each) for each in values_of(layers))
     return RadialTables(tuple(look_tables.bake(each, variation, covered, device) for each in every), layers)

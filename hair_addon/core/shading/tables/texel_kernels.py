@@ -233,25 +233,27 @@ def azimuthal_means(
     caustic = Caustic.at(cosines, settings, sigma_a)
     rows = (caustic.phi_c, caustic.fade, caustic.area)
     shape = (len(cosines), len(edges) - 1)
-    with wp.ScopedDevice(device):
-        sent = [wp.array(np.ascontiguousarray(values), dtype=F) for values in (edges, cosines, sigma_a, *rows)]
-        lobes = [wp.zeros((*shape, count), dtype=float) for count in (1, len(sigma_a), len(sigma_a))]
-        inputs = [*sent[:2], F(settings.eta), *sent[2:], F(settings.glint_width if is_treated else 0.0)]
-        kernel_cache.launch(_smooth_texels, dim=shape, inputs=inputs, outputs=lobes)
-        if spread is not None:
-            smooth, matrix = lobes, wp.array(spread, dtype=float)
-            lobes = [wp.empty_like(lobe) for lobe in smooth]
-            for source, target in zip(smooth, lobes, strict=True):
-                kernel_cache.launch(_spread_texels, dim=target.shape, inputs=[matrix, source], outputs=[target])
-        return [lobe.numpy() for lobe in lobes]
+    # No `wp.ScopedDevice`: the default device is that of all threads, and viewports bake in a thread.
+    given = (edges, cosines, sigma_a, *rows)
+    sent = [wp.array(np.ascontiguousarray(values), dtype=F, device=device) for values in given]
+    lobes = [wp.zeros((*shape, count), dtype=float, device=device) for count in (1, len(sigma_a), len(sigma_a))]
+    inputs = [*sent[:2], F(settings.eta), *sent[2:], F(settings.glint_width if is_treated else 0.0)]
+    kernel_cache.launch(_smooth_texels, dim=shape, inputs=inputs, outputs=lobes, device=device)
+    if spread is not None:
+        smooth, matrix = lobes, wp.array(spread, dtype=float, device=device)
+        lobes = [wp.empty_like(lobe) for lobe in smooth]
+        for source, target in zip(smooth, lobes, strict=True):
+            inputs = [matrix, source]
+            kernel_cache.launch(_spread_texels, dim=target.shape, inputs=inputs, outputs=[target], device=device)
+    return [lobe.numpy() for lobe in lobes]
 
 
 def longitudinal_texels(theta: np.ndarray, settings: Settings, device: str) -> np.ndarray:
     """Return M (H, W, 4), NumPy float32, baked on a Warp device; theta (W,): inclinations of columns and rows."""
     is_energy = settings.mode == "energy"
     lobes = energy_conserving.lobes(settings) if is_energy else longitudinal_lobes(settings)
-    with wp.ScopedDevice(device):
-        m = wp.empty((len(theta), len(theta), 4), dtype=float)
-        inputs = [wp.array(theta, dtype=F), wp.array(np.array(lobes, float), dtype=F)]
-        kernel_cache.launch(_d_eon_texels if is_energy else _gaussian_texels, dim=m.shape, inputs=inputs, outputs=[m])
-        return m.numpy()
+    m = wp.empty((len(theta), len(theta), 4), dtype=float, device=device)
+    inputs = [wp.array(values, dtype=F, device=device) for values in (theta, np.array(lobes, float))]
+    kernel = _d_eon_texels if is_energy else _gaussian_texels
+    kernel_cache.launch(kernel, dim=m.shape, inputs=inputs, outputs=[m], device=device)
+    return m.numpy()
