@@ -5,6 +5,10 @@ Simulated guides are outside, but the weighted sums of guides between them may p
 guides into the surface. From root to tip, each point that is inside is moved to the closest place outside; the
 following points move along and return gradually, so that strands keep their shape and almost their length. Strands that
 are outside stay bit-identical.
+
+A `Barrier` may remember where points near the surface were found outside, and how far they were from the surface: a
+point that has moved less since then is still outside, and is not searched again. Beyond a rim, a point can move behind
+the surface without crossing it, so half of the difference to the distance of the nearest rim limits the motion as well.
 """
 
 from collections.abc import Sequence
@@ -33,6 +37,8 @@ _AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves l
 _FAR = wp.constant(1e6)  # [m]
 _PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # tolerance of distances [m]
+_UNKNOWN = -1e6  # for a point that was not searched yet
+_RIM_CELLS = 4  # along the longest side of the box around all rims, to divide them into boxes
 
 _NON_FINITE = "Strands to keep outside need points with finite coordinates."
 
@@ -64,12 +70,17 @@ class Barrier:
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
         if self._colliders.mesh is not None:
             self._surface, self._grid = _surface_of(self._colliders), _grid_of(self._colliders, point_count)
+            self._rim_boxes = _rim_boxes_of(self._colliders)
+        self._known: dict[int, wp.array] = {}  # by point count: (G, P) vec4 for `_keep_outside`
 
-    def moved(self, points: np.ndarray, held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def moved(
+        self, points: np.ndarray, held: np.ndarray | None = None, known_as: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return strands (S, P, 3) [m] moved out of the obstacles, with the results of `moved_outside`.
 
-        held: (S,) number of points from the root that do not move, at least 1; None for the root alone. Raises
-        `HairError` for non-finite points.
+        held: (S,) number of points from the root that do not move, at least 1; None for the root alone; known_as: (S,)
+        different indices of strands, by which a later call knows them again: it takes less time, for the same result.
+        Raises `HairError` for non-finite points.
         """
         points = np.asarray(points, np.float64)
         if not np.isfinite(points).all():
@@ -85,7 +96,9 @@ class Barrier:
         first_moved = wp.array(np.clip(held, 1, points.shape[1]), dtype=int, device=device)
         out = wp.empty_like(original)
         moved = wp.zeros(len(points), dtype=int, device=device)
-        inputs = [Rows(original), Rows(first_moved), self._surface, self._grid]
+        known = self._known_of(known_as, points.shape[1])
+        rows = wp.array(np.zeros(len(points), np.int32) if known_as is None else known_as, dtype=int, device=device)
+        inputs = [Rows(original), Rows(first_moved), Rows(rows), self._surface, self._grid, *self._rim_boxes, known]
         parallel.launch(_keep_outside, len(points), inputs, [out, moved], device, least_rows=256)
         is_moved = moved.numpy() != 0
         if not is_moved.any():
@@ -95,6 +108,36 @@ class Barrier:
         corrected = points.copy()
         corrected[is_moved] = np.where(is_same, points[is_moved], after + self._origin)
         return corrected, is_moved
+
+    def _known_of(self, known_as, point_count):
+        """Return (G, P) vec4 of the last searches of points; empty if strands are not known again."""
+        if known_as is None:
+            return wp.empty((0, 0), dtype=wp.vec4, device=self._colliders.device)
+        if known_as.min(initial=0) < 0:
+            raise ValueError("Indices of strands must not be negative.")
+        count, known = int(known_as.max(initial=-1)) + 1, self._known.get(point_count)
+        if known is None or len(known) < count:
+            places = np.full((count, point_count, 4), _UNKNOWN, np.float32)
+            if known is not None:
+                places[: len(known)] = known.numpy()
+            known = self._known[point_count] = wp.array(places, dtype=wp.vec4, device=self._colliders.device)
+        return known
+
+
+def _rim_boxes_of(colliders):
+    """Return the low and the high corners (B,) vec3 [m] of boxes that contain the faces at rims."""
+    at_rims = np.flatnonzero(colliders.rims.numpy())
+    corners = colliders.mesh.points.numpy()[colliders.mesh.indices.numpy().reshape(-1, 3)[at_rims]]
+    low, high = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
+    if len(at_rims):
+        middles = corners.mean(axis=1)
+        size = max(float(np.ptp(middles, axis=0).max()) / _RIM_CELLS, 1e-9)
+        cells = np.floor((middles - middles.min(axis=0)) / size).astype(np.int64) @ np.array([1, 8, 64])
+        order = np.argsort(cells, kind="stable")
+        firsts = np.flatnonzero(np.diff(cells[order], prepend=-1))
+        low = np.minimum.reduceat(corners[order].min(axis=1), firsts)
+        high = np.maximum.reduceat(corners[order].max(axis=1), firsts)
+    return [wp.array(corner, dtype=wp.vec3, device=colliders.device) for corner in (low, high)]
 
 
 def _grid_of(colliders, point_count):
@@ -124,17 +167,37 @@ def _lack(surface: Surface, place: wp.vec3, radius: float):
     return hit.normal, lack, hit.gap
 
 
+@wp.func
+def _place_of(known: wp.vec4):
+    return wp.vec3(known[0], known[1], known[2])
+
+
+@wp.func
+def _known_at(place: wp.vec3, free: float, gap: float, low: wp.array[wp.vec3], high: wp.array[wp.vec3]):
+    """Return a place and the distance [m] that a point may move from there, `free` or less near rims."""
+    rim = float(_FAR)
+    for box in range(low.shape[0]):
+        rim = wp.min(rim, wp.length(place - wp.min(wp.max(place, low[box]), high[box])))
+    free = wp.min(free, 0.5 * (rim - gap))
+    return wp.vec4(place[0], place[1], place[2], free)
+
+
 @wp.kernel
 def _keep_outside(
     points: wp.array2d[wp.vec3],
     first_moved: wp.array[int],
+    rows: wp.array[int],
     surface: Surface,
     grid: DistanceGrid,
+    rim_low: wp.array[wp.vec3],
+    rim_high: wp.array[wp.vec3],
+    known: wp.array2d[wp.vec4],  # of rows: a place where each point was outside, and how far it may move from there
     # outputs
     out_points: wp.array2d[wp.vec3],
     out_moved: wp.array[int],
 ):
     strand = wp.tid()
+    row = rows[strand]
     last = points[strand, 0]
     out_points[strand, 0] = last
     is_moved = int(0)
@@ -158,6 +221,12 @@ def _keep_outside(
                 out_points[strand, i] = place
                 last = place
                 continue
+            if known.shape[0] > 0:
+                clear = known[row, i][3] - wp.length(place - _place_of(known[row, i]))
+                if clear > 0.0:
+                    out_points[strand, i] = place
+                    last = place
+                    continue
             lack = float(1.0)
             gap = float(0.0)
             # The previous point is outside: a surface between the two is no farther than their distance.
@@ -178,6 +247,8 @@ def _keep_outside(
                         if step <= _ROUNDS + _TURNS:
                             place = last + size * wp.normalize(place - last)
             clear = gap - surface.largest_distance
+            if known.shape[0] > 0 and lack <= _NEAR:
+                known[row, i] = _known_at(place, clear, gap, rim_low, rim_high)
         out_points[strand, i] = place
         last = place
     out_moved[strand] = is_moved

@@ -96,3 +96,29 @@ def test_segments_keep_their_lengths_in_notches(rng, device):
     assert is_inside.sum() <= 3 and np.abs(again - kept).max() < 1e-4  # rounding at the distance that points keep
     held = np.full(300, 5)
     np.testing.assert_array_equal(barrier.moved(strands, held)[0][:, :5], strands[:, :5])
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_strands_that_are_known_again_are_moved_alike(rng, is_open):
+    """Events of a stroke move strands to the same bits, whether points are remembered or all are searched again."""
+    mesh = read_obj(HEAD) if is_open else subdivided_sphere(3, 0.1)
+    height = mesh.vertices[:, 2]
+    faces = mesh.triangles[height[mesh.triangles].min(axis=1) > np.median(height)] if is_open else mesh.triangles
+    corners = mesh.vertices[faces[rng.choice(len(faces), 200)]].astype(np.float64)
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    strands = corners.mean(axis=1)[:, None] + np.linspace(0.0, 0.1, 21)[:, None] * outward[:, None]
+    obstacle = Obstacle("Scalp", mesh.vertices.astype(np.float64), faces, distance=1e-4)
+    searched, known = (Barrier([obstacle], np.zeros(3), strands.size // 3) for _ in range(2))
+    chosen = rng.permutation(200)
+    moved_count = 0
+    for event in range(12):
+        way = 0.02 * np.array([np.cos(event), np.sin(event), -0.7]) - 0.02 * outward
+        strands = strands + np.linspace(0.0, 1.0, 21)[:, None] * way[:, None] * rng.random((200, 1, 1))
+        wanted, is_moved = searched.moved(strands[chosen])
+        again, is_moved_again = known.moved(strands[chosen], known_as=chosen)
+        np.testing.assert_array_equal(again, wanted)
+        np.testing.assert_array_equal(is_moved_again, is_moved)
+        strands[chosen], moved_count = wanted, moved_count + is_moved.sum()
+        chosen = rng.permutation(200)[: 150 + event]
+    assert moved_count > 100

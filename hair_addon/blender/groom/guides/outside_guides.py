@@ -96,11 +96,13 @@ def _pushed_at_rest(datablock, barrier, points, starts, changed):
     """Return the result of `pushed_out` on a surface at rest. Only changed guides are read, as strokes must be fast."""
     counts, local = np.diff(starts), points
     for count in np.unique(counts[(counts > 1) & (changed > 0.0)]):
-        places = starts[:-1][(counts == count) & (changed > 0.0)][:, None] + np.arange(count)
+        chosen = np.flatnonzero((counts == count) & (changed > 0.0))
+        places = starts[chosen][:, None] + np.arange(count)
         shape = barrier.surface.from_local(points[places])
         if not np.isfinite(shape).all():
             return points
-        after, is_moved = barrier.barrier.moved(barrier.factor * shape.astype(np.float64), _held(datablock, places))
+        posed, held = barrier.factor * shape.astype(np.float64), _held(datablock, places)
+        after, is_moved = barrier.barrier.moved(posed, held, chosen)
         after, rows = (after[is_moved] / barrier.factor).astype(np.float32), places[is_moved]
         moved = (after != shape[is_moved]).any(axis=2)
         if moved.any():
@@ -177,7 +179,7 @@ def _pushed(guides, barrier, chosen, places):
 def _pushed_shape(guides, barrier, chosen, places, shape, posed):
     """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3)."""
     held = _held(guides.datablock, places)
-    after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held)
+    after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held, chosen)
     pushed = shape.copy()
     if is_moved.any():
         after = (after[is_moved] / barrier.factor).astype(np.float32)
