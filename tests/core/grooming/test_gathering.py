@@ -17,6 +17,7 @@ from tests.support.meshes import subdivided_sphere
 RADIUS, LENGTH = 0.1, 0.3  # [m]
 SETTINGS = GatherSettings(clearance=0.002, tie_radius=0.008, tail_radius=0.015, tightness=1.0)
 TIE = np.array([0.0, 0.08, 0.06])  # on the sphere
+IN_BRAID = 9  # the first point behind the tie of a guide of 31
 TAIL = TIE + np.array([(0.0, 0.0, 0.0), (0.0, 0.03, 0.02), (0.0, 0.05, -0.02), (0.0, 0.05, -0.2)])
 
 
@@ -62,18 +63,53 @@ def test_distances_on_a_plane_are_exact_and_on_a_sphere_within_three_percent(bal
 
 
 @pytest.mark.parametrize("shape", ["PONYTAIL", "BRAID", "ROPE"])
-def test_roots_and_lengths_stay_and_guides_pass_the_tie(ball, shape):
+def test_roots_stay_and_guides_pass_the_tie(ball, shape):
     guides = guides_on(80)
     after, groups, _held = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
     assert (groups == 1).all() if shape == "PONYTAIL" else len(np.unique(groups)) > 1
     assert groups.min() == 1
     np.testing.assert_array_equal(after[:, 0], guides[:, 0])
-    np.testing.assert_allclose(segments(after), segments(guides), rtol=1e-4)
+    if shape == "PONYTAIL":
+        np.testing.assert_allclose(segments(after), segments(guides), rtol=1e-4)
     lifted = TIE * (1.0 + SETTINGS.clearance / RADIUS)
     assert from_tie(after, lifted).max() < 2.0 * SETTINGS.tie_radius
     assert np.linalg.norm(after, axis=2).min() > 0.97 * RADIUS
     is_near = np.linalg.norm(guides[:, 0] - TIE, axis=1) < 0.1
     assert after[is_near, -1, 2].max() < TIE[2]  # where the line leads
+
+
+@pytest.mark.parametrize("shape", ["BRAID", "ROPE"])
+def test_strands_of_guides_of_any_length_stay_in_a_braid_up_to_its_tuft(ball, shape):
+    """Strands are means of their guides: means of places that are apart in a lock lie outside of the braid."""
+    guides = guides_on(80)
+    whole = LENGTH * np.linspace(0.9, 1.5, 80)
+    guides = (guides[:, :1] + (guides - guides[:, :1]) * (whole / LENGTH)[:, None, None]).astype(np.float32)
+    after, groups, _held = gathered(ball, guides, [TAIL], replace(SETTINGS, shape=shape))
+    near = np.argsort(np.linalg.norm(after[:, None, 0] - after[None, :, 0], axis=2), axis=1)
+    strands = []
+    for guide, others in enumerate(near):
+        own = others[groups[others] == groups[guide]][:3]
+        strands.append(after[own].astype(np.float64).mean(axis=0))
+        # In step along the braid: strands are not shortened, so they keep their place when they are lengthened.
+        steps = np.diff(after[own, IN_BRAID:].astype(np.float64), axis=1)
+        assert np.linalg.norm(steps.mean(axis=0), axis=1).min() > 0.9 * np.linalg.norm(steps, axis=2).min()
+    assert np.linalg.norm(0.5 * (after[:, 1:] + after[:, :-1]), axis=2).min() > 0.995 * RADIUS  # also between points
+    middle = after[:, IN_BRAID:].astype(np.float64).mean(axis=0)
+    apart = np.linalg.norm(np.array(strands)[:, IN_BRAID:] - middle, axis=2)
+    assert apart[:, :-3].max() < 1.1 * SETTINGS.tail_radius
+    assert apart[:, -4].max() < 0.5 * SETTINGS.tail_radius  # the second tie
+    assert apart[:, -1].max() < 0.2 * SETTINGS.tail_radius  # the tip of the tuft
+    ends = after[:, -1]
+    assert np.linalg.norm(ends - ends.mean(axis=0), axis=1).max() < 0.3 * SETTINGS.tail_radius
+
+
+@pytest.mark.parametrize("shape", ["BRAID", "ROPE"])
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_guides_of_few_points_are_braided(ball, count, shape):
+    some = guides_on(20)[:, np.linspace(0, 30, count).astype(int)]
+    after, groups, held = gathered(ball, some, [TAIL], replace(SETTINGS, shape=shape))
+    assert (groups > 0).all() and np.isfinite(after).all() and held.min() >= 0.0
+    np.testing.assert_array_equal(after[:, 0], some[:, 0])
 
 
 BUN = replace(SETTINGS, shape="BUN", bun_radius=0.03)

@@ -24,7 +24,6 @@ _THICKEST = 0.45  # radius of a coil with few turns relative to the bun
 _TUCKED = 0.4  # turns of the coil's end, below the coil
 _INWARD = 0.5  # radius of the bun where the coil ends, relative to its edge
 _END = 0.45  # radius of the coil's end relative to the coil
-_ON_WAY = 0.25  # share of a guide's segments on its way to the tie
 _STRAIGHT = 0.3  # curvature relative to the median, below which the distance of points stays
 _OF_TURN = 6  # least number of segments in a turn
 _RISING, _COILED, _TUCKING = 60, 2000, 200  # points of the parts of the line
@@ -56,12 +55,6 @@ class Bun:
         size = np.sqrt(ranks)[:, None] * np.interp(along, self.line.along, self.radii)
         across = np.cos(angles)[:, None, None] * sides + np.sin(angles)[:, None, None] * ups
         return centers + size[..., None] * across
-
-
-def segment_counts(count: int) -> tuple[int, int]:
-    """Return how many of a guide's segments are on its way to the tie, and how many in the bun."""
-    on_way = max(1, round(_ON_WAY * count))
-    return on_way, count - on_way
 
 
 def with_points_enough(settings: GatherSettings, segments: int) -> GatherSettings:

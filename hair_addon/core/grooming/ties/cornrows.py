@@ -27,7 +27,6 @@ _RISE = 0.75  # height of a braid's middle above its clearance, relative to its 
 _ON_WAY = 4  # least number of segments of a guide before it follows a row
 _OF_PITCH = 6  # segments in which a lock returns to its place
 _ASIDE, _ABOVE, _LOCK = 0.62, 0.36, 0.42  # path of a lock across the braid, and its radius, relative to the braid's
-_TIP = 0.35  # radius of the tail's end, relative to the row
 
 
 @dataclass(frozen=True)
@@ -92,12 +91,14 @@ def points_of(
     """
     along, line = row.places, row.line
     radius = settings.tie_radius * (0.6 + 0.4 * tie_tails.ease(along / row.pitch))
-    radius = radius * (1.0 - (1.0 - _TIP) * tie_tails.ease((along - row.on_surface) / line.reach))
+    end = tie_tails.second_tie(along, settings.tie_radius, line.reach)
+    radius = radius * tie_tails.narrowed(along, min(row.on_surface, end), end, settings.tie_radius)
+    share = tie_tails.ease((end - along) / (0.5 * row.pitch))  # of the braid, which becomes a tuft
     phase = 2.0 * np.pi * (along / row.pitch + (locks / tie_tails.LOCKS["CORNROWS"])[:, None])
     angles = 2.0 * np.pi * tie_tails.LOCKS["CORNROWS"] * places / row.pitch
-    own = _LOCK * np.sqrt(ranks)
-    aside = _ASIDE * np.sin(phase) + (own * np.cos(angles))[:, None]
-    above = _ABOVE * np.sin(2.0 * phase) + (own * np.sin(angles))[:, None]
+    own = np.sqrt(ranks)[:, None] * (1.0 + share * (_LOCK - 1.0))
+    aside = share * _ASIDE * np.sin(phase) + own * np.cos(angles)[:, None]
+    above = share * _ABOVE * np.sin(2.0 * phase) + own * np.sin(angles)[:, None]
     centers, sides, ups = line.at(along)
     return centers + (radius * aside)[..., None] * sides + (radius * above)[..., None] * ups
 

@@ -4,8 +4,8 @@
 The way of a root over the surface descends the distance from the tie (geometry/surface_distance.py). Its height
 grows toward the tie, because it lies on the hair of all roots that it passes: by the area of this hair divided by the
 circumference. Each guide keeps its angle around the tie, and its distance determines its place in the disk of the tie,
-by equal areas. Segments keep their lengths, except in buns and cornrows; guides that are too short end before
-the tie.
+by equal areas. Segments keep their lengths, except in buns, ropes, braids and cornrows; guides that are too short end
+before the tie.
 """
 
 from collections.abc import Sequence
@@ -29,6 +29,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _STEPS = 160  # of the longest way over the surface
 _TAIL_POINTS = 300
+_NEAR_ROOT = 1.5  # power of places on the way to a braid: close points where hair rises, so that it stays outside
 _BULGE = 0.25  # height of loose hair relative to its way
 
 
@@ -97,9 +98,11 @@ def _at_line(mesh, query, points, line, field, settings):
         return _in_bun(mesh, query, points, (ways, ranks), line, settings)
     if settings.shape == "CORNROWS":
         return _in_row(points, (ways, ranks), cornrows.on_surface(query, mesh, line), settings)
-    ends = _lengths(ways)
-    behind, locks = _behind_tie(mesh, query, ways, ranks, line, reach, settings)
-    return _along(points, np.concatenate([ways, behind], axis=1)), locks, ends
+    normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
+    if settings.shape in tie_tails.LOCKS:
+        return _in_braid(points, (ways, ranks), line, normal, settings)
+    behind = _in_tail(ways, ranks, tie_tails.tail_line(line, normal, reach, settings), normal, settings)
+    return _along(points, np.concatenate([ways, behind], axis=1)), np.zeros(len(ways), int), _lengths(ways)
 
 
 def _along(points, ways):
@@ -112,7 +115,7 @@ def _along(points, ways):
 def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
     """Return the result of `_at_line` for a bun: guides that reach the tie become as long as the coil."""
     ways, ranks = ways_and_ranks
-    on_way, coiled = buns.segment_counts(points.shape[1] - 1)
+    on_way, coiled = tie_tails.segment_counts(points.shape[1] - 1)
     bun = buns.wound(mesh, query, line, buns.with_points_enough(settings, coiled))
     normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
     wound = bun.points(_angles(ways, bun.line, normal), ranks, coiled + 1)
@@ -122,6 +125,28 @@ def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
     evenly = _evenly(ways[is_long], on_way + 1)
     after[is_long] = np.concatenate([evenly, wound[is_long, 1:]], axis=1)
     return after, np.zeros(len(ways), int), np.full(len(ways), np.inf)
+
+
+def _in_braid(points, ways_and_ranks, line, normal, settings):
+    """Return the result of `_at_line` for a rope or braid: guides that reach the tie end together."""
+    ways, ranks = ways_and_ranks
+    lengths, whole = _lengths(ways), split(points)[1].sum(axis=1)
+    is_long = whole > lengths
+    reach = max(float(np.median((whole - lengths)[is_long])) if is_long.any() else 0.0, 1e-6)
+    tail = tie_tails.tail_line(line, normal, reach, settings)
+    angles = _angles(ways, tail, normal)
+    locks = tie_tails.locks_at(angles, settings)
+    on_way, behind = tie_tails.segment_counts(points.shape[1] - 1)
+    along = np.linspace(0.0, reach, max(behind, 1) + 1)
+    centers, sides, ups = tail.at(along)
+    offsets = tie_tails.braided(tail, angles, ranks, along, locks, settings)
+    braid = centers + offsets[..., :1] * sides + offsets[..., 1:] * ups
+    ways = np.concatenate([ways, braid[:, :1]], axis=1)
+    after = _along(points, ways)
+    after[is_long] = np.concatenate(
+        [_evenly(ways[is_long], on_way + 1, _NEAR_ROOT), braid[is_long, 1 : behind + 1]], axis=1
+    )
+    return after, locks, np.where(is_long, lengths, np.inf)
 
 
 def _in_row(points, ways_and_ranks, surface_below, settings):
@@ -148,12 +173,14 @@ def _in_row(points, ways_and_ranks, surface_below, settings):
     return after, locks, ends
 
 
-def _evenly(ways, count):
-    """Return (S, count, 3) points at equal distances along ways (S, K, 3), from their first point to their last."""
+def _evenly(ways, count, power=1.0):
+    """Return (S, count, 3) points along ways (S, K, 3), from their first point to their last: at equal distances, or
+    with powers above 1 closer to each other near the first.
+    """
     along = np.concatenate([np.zeros((len(ways), 1)), np.linalg.norm(np.diff(ways, axis=1), axis=2).cumsum(axis=1)], 1)
     found = np.empty((len(ways), count, 3))
     for row, (lengths, way) in enumerate(zip(along, ways, strict=True)):
-        places = np.linspace(0.0, lengths[-1], count)
+        places = lengths[-1] * np.linspace(0.0, 1.0, count) ** power
         found[row] = np.stack([np.interp(places, lengths, axis) for axis in way.T], axis=1)
     return found
 
@@ -163,17 +190,12 @@ def _lengths(ways):
     return np.linalg.norm(np.diff(ways, axis=1), axis=2).sum(axis=1)
 
 
-def _behind_tie(mesh, query, ways, ranks, line, reach, settings):
-    """Return the ways (S, M, 3) of guides behind a tie, and their locks (S,)."""
-    tie = query.nearest(line[:1])
-    tail = tie_tails.tail_line(line, mesh_math.normals(mesh, tie)[0], reach, settings)
-    angles = _angles(ways, tail, mesh_math.normals(mesh, tie)[0])
-    along = np.linspace(0.0, reach, _TAIL_POINTS)
-    along = np.broadcast_to(along, (len(ways), _TAIL_POINTS))
+def _in_tail(ways, ranks, tail, normal, settings):
+    """Return the ways (S, M, 3) of guides in a tail behind the tie."""
+    along = np.broadcast_to(np.linspace(0.0, tail.reach, _TAIL_POINTS), (len(ways), _TAIL_POINTS))
     centers, sides, ups = tail.at(along)
-    locks = tie_tails.locks_at(angles, settings)
-    offsets = tie_tails.offsets(tail, angles, ranks, along, locks, settings)
-    return centers + offsets[..., :1] * sides + offsets[..., 1:] * ups, locks
+    offsets = tie_tails.offsets(tail, _angles(ways, tail, normal), ranks, along, settings)
+    return centers + offsets[..., :1] * sides + offsets[..., 1:] * ups
 
 
 def _traced(mesh, query, roots, field, settings):

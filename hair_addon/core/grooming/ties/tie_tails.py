@@ -2,6 +2,8 @@
 """The way of gathered hair behind its tie: along a drawn line, as one tail, a rope or a braid.
 
 Hair keeps its place in the disk of the tie, in frames that are carried along the line by least rotations [Bishop75].
+Ropes and braids end in a second tie and a tuft. All guides have their points at the same places of a rope or braid: a
+strand is a mean of its guides, and a mean of different places of a lock lies outside of the braid.
 """
 
 from dataclasses import dataclass
@@ -13,7 +15,12 @@ from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
 LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
+_OF_PITCH = 8  # least number of segments in which a lock returns to its place, and crosses the middle four times
+_ON_WAY = 0.25  # share of the segments of a guide that are on its way; fewer would cut through the head
 _TAPER = 0.35  # radius of the tail's end, relative to its widest place
+_NARROWING = 0.65  # radius of a braid near its second tie, relative to its widest place
+_SECOND_TIE, _TUFT, _TIP = 0.45, 0.55, 0.12  # radii of the second tie, the tuft and its tip, relative to the braid
+_TUFT_LENGTH, _TUFT_PART = 2.5, 0.15  # greatest length of a tuft relative to the tail's radius, and to its length
 
 
 @dataclass(frozen=True)
@@ -82,31 +89,70 @@ def offsets(
     angles: np.ndarray,
     ranks: np.ndarray,
     along: np.ndarray,
+    settings: GatherSettings,
+) -> np.ndarray:
+    """Return (S, M, 2) [m]: the place of the hair of a tail beside its line, along its sides and ups.
+
+    angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie.
+    """
+    place = np.sqrt(ranks)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return _radius(line, along, settings)[..., None] * place[:, None]
+
+
+def braided(
+    line: TailLine,
+    angles: np.ndarray,
+    ranks: np.ndarray,
+    along: np.ndarray,
     locks: np.ndarray,
     settings: GatherSettings,
 ) -> np.ndarray:
-    """Return (S, M, 2) [m]: the place of hair beside the line, along its sides and ups.
+    """Return (S, M, 2) [m]: the place of the hair of a rope or braid beside its line, as `offsets` does.
 
-    angles (S,), ranks (S,) in [0, 1]: the place in the disk of the tie by equal area; along: (S, M) [m] from the tie;
-    locks (S,): the lock that hair belongs to.
+    along (M,) [m]: of evenly spaced points of all guides; locks (S,): that hair belongs to.
     """
     unit_radius = np.sqrt(ranks)
     place = unit_radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    radius = _radius(line, along, settings)
-    gathered = radius[..., None] * place[:, None]
-    count = LOCKS.get(settings.shape)
-    if count is None:
-        return gathered
+    count, end = LOCKS[settings.shape], second_tie(along, settings.tail_radius, line.reach)
     turn = angles * count
     own = unit_radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    phase = 2.0 * np.pi * (along / settings.pitch + (locks / count)[:, None])
+    pitch = max(settings.pitch, _OF_PITCH * float(along[1] - along[0]))
+    phase = 2.0 * np.pi * (along / pitch + (locks / count)[:, None])
     if settings.shape == "ROPE":
         centers, size = 0.5 * np.stack([np.cos(phase), np.sin(phase)], axis=-1), 0.5
     else:  # three locks that cross in turn over and under the middle
         centers, size = np.stack([0.62 * np.sin(phase), 0.36 * np.sin(2.0 * phase)], axis=-1), 0.4
-    braided = radius[..., None] * (centers + size * own[:, None])
-    share = ease(along / (0.5 * settings.pitch))[..., None]
-    return gathered + share * (braided - gathered)
+    in_lock = centers + size * own[:, None]
+    share = (ease(along / (0.5 * pitch)) * ease((end - along) / (0.5 * pitch)))[:, None]
+    grown = settings.tie_radius + ease(along / (0.25 * line.reach)) * (settings.tail_radius - settings.tie_radius)
+    radius = grown * narrowed(along, 0.4 * end, end, settings.tail_radius)
+    return radius[:, None] * (place[:, None] + share * (in_lock - place[:, None]))
+
+
+def segment_counts(count: int) -> tuple[int, int]:
+    """Return how many of a guide's segments are on its way to the tie, and how many behind it."""
+    on_way = max(1, round(_ON_WAY * count))
+    return on_way, count - on_way
+
+
+def second_tie(along: np.ndarray, radius: float, reach: float) -> float:
+    """Return the place [m] of the second tie of a braid of a radius [m], at one of its points (M,) [m].
+
+    reach: length [m] of the braid's part that hangs free.
+    """
+    step = float(along[1] - along[0])
+    return float(along[-1]) - step * round(min(_TUFT_LENGTH * radius, _TUFT_PART * reach) / step)
+
+
+def narrowed(along: np.ndarray, start: float, end: float, radius: float) -> np.ndarray:
+    """Return factors (M,) of the radius [m] of a braid at places (M,) [m]: it narrows from start to its second tie at
+    end, and continues as a tuft.
+    """
+    before = 1.0 - (1.0 - _NARROWING) * ease((along - start) / max(end - start, 1e-9))
+    tied = 1.0 - (1.0 - _SECOND_TIE) * ease(1.0 - (end - along) / radius)
+    beyond = (along - end) / max(float(along[-1]) - end, 1e-9)
+    tuft = _SECOND_TIE + (_TUFT - _SECOND_TIE) * ease(beyond / 0.35) - (_TUFT - _TIP) * ease((beyond - 0.35) / 0.65)
+    return np.where(along <= end, before * tied, _NARROWING * tuft)
 
 
 def _radius(line, along, settings):
