@@ -34,15 +34,17 @@ def path_count(blender_scene, size):
     return min(max(_PATHS_A_PIXEL * size[0] * size[1], _LEAST_PATHS), _MOST_PATHS)
 
 
-def most_paths(device, count):
-    """Return the maximum number of paths on a Warp device for a picture of `count` paths."""
+def most_paths(device, count, step_count=1):
+    """Return the maximum number of paths on a Warp device for a picture of `count` paths, one of `step_count` motion
+    steps of a frame, which share the paths that a frame may have.
+    """
     most = _MOST_TIMES * count
-    return most if device.is_cpu else max(most, min(_MOST_TIMES_ON_GPU * count, _MOST_ON_GPU))
+    return most if device.is_cpu else max(most, min(_MOST_TIMES_ON_GPU * count, _MOST_ON_GPU // step_count))
 
 
-def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress):
+def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress, step_count=1):
     """Return a `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4)
-    matrices.
+    matrices. step_count: of a frame with motion blur, whose mean has less noise than a step.
 
     Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, no
     path starts in sight, hair is too large for its width, any light is linked, or any hair is not shaded by the
@@ -67,9 +69,9 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     if not len(seen.segments):
         return drawn
     progress(light_paths.gather.FOLLOWING, 0.3)
-    most = most_paths(grid.device, count)
+    most = most_paths(grid.device, count, step_count)
     # On a processor, paths take more time than all other work.
-    noise = np.inf if grid.device.is_cpu else NOISE
+    noise = np.inf if grid.device.is_cpu else NOISE * np.sqrt(step_count)
     starting = -(-len(seen.segments) // SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
     surroundings = surroundings_of(drawn)

@@ -2,6 +2,7 @@
 """Path-traced light among strands gives pictures with known colors."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from mathutils import Vector
 
 from hair_addon import api
+from hair_addon.blender.render import light_paths
 from hair_addon.core.shading import presets
 from hair_addon.core.shading.light_paths import gather
 
@@ -134,3 +136,25 @@ def test_a_thick_ring_covers_its_area(scene):
     drawn = picture(scene, "DUAL")
     area = np.ptp(turn) * 0.5 * 0.2 + np.pi * 0.1**2
     assert drawn[..., 3].sum() * (1.6 / 64) ** 2 == pytest.approx(area, rel=0.01)
+
+
+@pytest.mark.parametrize("device", ["cpu", "cuda"])
+def test_steps_of_motion_blur_share_the_paths_of_a_frame(device):
+    """A frame of any number of steps has at most the paths of a still one, to a path per step."""
+    device, count = SimpleNamespace(is_cpu=device == "cpu"), 300_000
+    still = light_paths.most_paths(device, count)
+    for steps in (2, 5, 8, 64):
+        assert steps * light_paths.most_paths(device, -(-count // steps), steps) <= still + 4 * steps
+
+
+def test_each_step_of_a_blurred_render_gets_its_share(scene, rng, monkeypatch):
+    """The number of steps reaches the tracing of each step."""
+    hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN)
+    light(scene, sun=2.0)
+    scene.render.engine, scene.render.resolution_percentage = "VELLUS", 100
+    scene.render.resolution_x, scene.render.resolution_y, scene.vellus.sample_count = 32, 32, 4
+    scene.vellus.multiple_scattering, scene.render.use_motion_blur, scene.vellus.motion_steps = "GRID", True, 3
+    found, real = [], light_paths.most_paths
+    monkeypatch.setattr(light_paths, "most_paths", lambda _device, *given: found.append(given) or real(_device, *given))
+    bpy.ops.render.render()
+    assert found == [(-(-light_paths.path_count(scene, (32, 32)) // 3), 3)] * 3

@@ -111,7 +111,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
         path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
-        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count, labels
+        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count, labels, len(offsets)
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
         progress = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
         before = _NEIGHBOURS if "Vector" in passes else 0.0

@@ -19,7 +19,7 @@ class Frame:
     size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of the rendered part;
     sample_count: per pixel in each motion step; passes, is_transparent, filter_width: of `film.Film`; lens_passes:
     minimum passes per motion step, for depth of field; path_count: paths through the light grid in each, 0: none;
-    labels: `mattes.Labels` if mattes are wanted.
+    labels: `mattes.Labels` if mattes are wanted; step_count: number of motion steps.
     """
 
     def __init__(
@@ -33,8 +33,10 @@ class Frame:
         lens_passes=1,
         path_count=0,
         labels=None,
+        step_count=1,
     ):
         self._size, self._window, self._path_count, self._passes = size, window, path_count, passes
+        self._step_count = step_count
         self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
         self._turns = sample_count // self._per_side**2
         self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
@@ -61,7 +63,7 @@ class Frame:
         traced = []
         for number, one in enumerate((drawn, *groups.values())):
             tracing = part_of(following, number / (1 + len(groups)), (number + 1) / (1 + len(groups)))
-            arguments = world_to_view, view_to_clip, self._path_count, self._moment_count, tracing
+            arguments = world_to_view, view_to_clip, self._path_count, self._moment_count, tracing, self._step_count
             traced.append(light_paths.with_grid(one, *arguments))
         drawn, groups = traced[0], dict(zip(groups, traced[1:], strict=True))
         done = 0
