@@ -121,6 +121,7 @@ def _strand_curves(hair, shown, group, name, first_id, per_meter, settings):
         guide_weights=weights,
         colors=colors,
         roughness=roughness,
+        radial_roughness=varied.radial if settings.has_color and varied is not None else None,
         look=look,
     )
 

@@ -8,7 +8,7 @@
 
     Exported files also have, with the prefix strand_ or guide_: ids (S,); root_uvs (S, 2); groups (S,), indices into
     group_names (K,); and of strands only: strand_guide_ids and strand_guide_weights (S, 3); strand_colors (S, P, 3),
-    linear RGB; strand_roughness (S, P)
+    linear RGB; strand_roughness (S, P); strand_radial_roughness (S,) if a map varies it
 
 Only one of strand_points and guide_points is required. If curves have different numbers of points, the points of all
 curves are concatenated, (N, 3), with widths (N,), and the counts have the number of points of each curve.

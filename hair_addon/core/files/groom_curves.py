@@ -29,8 +29,8 @@ class GroomCurves:
 
     counts: (S,) int32 numbers of points; first_id: ID of the first curve, IDs are consecutive; widths: diameters
     (N,), in the unit of points; root_uvs: (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) from
-    `closest_guides`, None for guides; colors: linear RGB (N, 3), and roughness (N,), None if not exported; look: of
-    strands.
+    `closest_guides`, None for guides; colors: linear RGB (N, 3), and roughness (N,), None if not exported;
+    radial_roughness: (S,), None unless exported and varied by a map; look: of strands.
     """
 
     group_id: int
@@ -44,6 +44,7 @@ class GroomCurves:
     guide_weights: np.ndarray | None = None
     colors: Rows | None = None
     roughness: Rows | None = None
+    radial_roughness: np.ndarray | None = None
     look: Appearance | None = None
 
     @property

@@ -81,10 +81,18 @@ class RootTexels:
         """Return means (S, C) float32, NaN without a tile; pixels: {tile: (H, W, C) float32, bottom row first}."""
         levels = {tile: each if isinstance(each, Levels) else Levels(each) for tile, each in pixels.items()}
         channels = next(iter(levels.values())).pixels.shape[2] if levels else 1
-        found = np.full((self.strand_count, channels), np.nan, np.float32)
-        for tile, taps in self.tiles.items():
-            if tile in levels:
-                found[taps.strands] = _means(taps, levels[tile])
+        return self.resample(np.full((self.strand_count, channels), np.nan, np.float32), levels)
+
+    def resample(self, before: np.ndarray, pixels: "Mapping[int | None, np.ndarray | Levels]") -> np.ndarray:
+        """Return the means (S, C) where some tiles have changed; only strands on these tiles are sampled.
+
+        before: (S, C) means before the change; pixels: of the changed tiles.
+        """
+        found = before.copy()
+        for tile, each in pixels.items():
+            taps = self.tiles.get(tile)
+            if taps is not None:
+                found[taps.strands] = _means(taps, each if isinstance(each, Levels) else Levels(each))
         return found
 
     def follow(self, before: np.ndarray, levels: "Levels", changed: tuple[slice, slice] | None) -> np.ndarray:

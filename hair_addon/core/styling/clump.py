@@ -49,7 +49,7 @@ class Settings(ProfiledSettings):
     )
     levels: int = param(
         2,
-        "Levels of locks: each lock is made of smaller ones",
+        "Levels of locks: each lock is made of smaller ones. A map cannot vary a whole number",
         low=1,
         high=MOST_LEVELS,
         is_structural=True,
@@ -99,7 +99,8 @@ class Settings(ProfiledSettings):
     )
     tip_level: int = param(
         0,
-        "Level of locks whose strands curl alike in the styles below; 0 is the largest",
+        "Level of locks whose strands curl alike in the styles below; 0 is the largest. "
+        "A map cannot vary a whole number",
         label="Coherent level",
         low=0,
         high=MOST_LEVELS - 1,

@@ -67,7 +67,11 @@ class Settings(ProfiledSettings):
         has_course=True,
     )
     octaves: int = param(
-        2, "Number of octaves of noise; each has half the wavelength of the previous octave", low=1, high=MOST_OCTAVES
+        2,
+        "Number of octaves of noise; each has half the wavelength of the previous octave. "
+        "A map cannot vary a whole number",
+        low=1,
+        high=MOST_OCTAVES,
     )
     gain: float = param(
         0.5,

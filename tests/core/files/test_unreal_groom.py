@@ -16,7 +16,7 @@ from hair_addon.core.files.curve_file import Convention
 from hair_addon.core.files.groom_curves import GroomCurves
 from tests.support.exchange import alembic_reader
 
-# Alembic for Grooms, version 1.5: name → (type, extent, scope).
+# Alembic for Grooms, version 1.5, and our radial roughness: name → (type, extent, scope).
 SPECIFICATION = {
     "groom_version_major": ("int16_t", 1, "constant"),
     "groom_version_minor": ("int16_t", 1, "constant"),
@@ -30,6 +30,7 @@ SPECIFICATION = {
     "groom_width": ("float32_t", 1, "vertex"),
     "groom_color": ("float32_t", 3, "vertex"),
     "groom_roughness": ("float32_t", 1, "vertex"),
+    "groom_radial_roughness": ("float32_t", 1, "uniform"),
     "groom_closest_guides": ("int32_t", 3, "uniform"),
     "groom_guide_weights": ("float32_t", 3, "uniform"),
 }
@@ -46,6 +47,7 @@ def groom(rng, strand_count=40, guide_count=6, point_count=5):
         "widths": rng.random((strand_count, point_count), np.float32),
         "colors": rng.random((strand_count, point_count, 3), np.float32),
         "roughness": rng.random((strand_count, point_count), np.float32),
+        "radial": rng.random(strand_count, np.float32),
         "uvs": rng.random((strand_count, 2), np.float32),
     }
     guides = GroomCurves(
@@ -69,6 +71,7 @@ def groom(rng, strand_count=40, guide_count=6, point_count=5):
         weights,
         lambda chosen: arrays["colors"][chosen].reshape(-1, 3),
         lambda chosen: arrays["roughness"][chosen].ravel(),
+        arrays["radial"],
     )
     return guides, strands, arrays
 
@@ -132,6 +135,7 @@ def test_every_array_comes_back(written):
     np.testing.assert_array_equal(found["groom_width"], arrays["widths"].ravel())
     np.testing.assert_array_equal(found["groom_color"], arrays["colors"].reshape(-1, 3))
     np.testing.assert_array_equal(found["groom_roughness"], arrays["roughness"].ravel())
+    np.testing.assert_array_equal(found["groom_radial_roughness"], arrays["radial"])
     np.testing.assert_array_equal(found["groom_root_uv"], arrays["uvs"])
     np.testing.assert_array_equal(found["groom_id"], strands.ids)
     np.testing.assert_array_equal(found["groom_closest_guides"], strands.guide_ids)

@@ -161,7 +161,7 @@ def test_stacked_islands_share_their_texels(rng):
 
 
 def test_tiles_of_udim(rng):
-    """Roots in each tile take its image; roots without a tile have no value."""
+    """Roots in each tile take its image, also after one tile has changed; roots without a tile have no value."""
     mesh, uvs = plane(4)
     wide = uvs * np.float32([3.0, 2.0])
     sizes = {1001: (4, 4), 1002: (8, 2), 1012: (1, 1)}
@@ -169,8 +169,11 @@ def test_tiles_of_udim(rng):
     roots = roots_on(mesh, 400, rng)
     at = np.einsum("nc,ncu->nu", roots.barycentric, wide[roots.triangle])
     wanted = 1001 + np.floor(at[:, 0]) + 10 * np.floor(at[:, 1])
-    found = box_filter.root_texels(mesh, wide, roots, sizes).sample(images)[:, 0]
-    np.testing.assert_array_equal(found, np.where(np.isin(wanted, list(sizes)), wanted, np.nan))
+    texels = box_filter.root_texels(mesh, wide, roots, sizes)
+    found = texels.sample(images)
+    np.testing.assert_array_equal(found[:, 0], np.where(np.isin(wanted, list(sizes)), wanted, np.nan))
+    changed = {1002: 7.0 * images[1002]}
+    np.testing.assert_array_equal(texels.resample(found, changed), texels.sample(images | changed))
 
 
 def test_the_unit_of_the_surface_does_not_matter(rng):

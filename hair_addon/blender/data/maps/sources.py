@@ -157,23 +157,26 @@ class Source:
         if known is None or not (_are_same(known.roots, roots) and _are_equal(known.corner_uvs, self.corners)):
             texels = maps.box_filter.root_texels(self.surface.mesh, self.corners, roots, sizes)
             known = texel_cache.keep(key, _Known(roots, self.corners, sizes, texels))
-        if set(self.pixels) != {None}:
-            return known.texels.sample(self.pixels)
         key = self.hair_uid, self.settings.uv, self.settings.source, self.is_color
         before = mean_cache.get(key)
         means = self._means(known.texels, before)
-        mean_cache.keep(key, _Means(known.texels, self.pixels[None], means))
+        mean_cache.keep(key, _Means(known.texels, self.pixels, means))
         return means
 
     def _means(self, texels, before):
-        """Return the means of an image without tiles; only strands at changed texels get new means."""
-        now = self.pixels[None]
+        """Return the means of an image; only strands at changed texels, or on changed tiles, get new means."""
+        is_tiled = set(self.pixels) != {None}
         if before is None or before.texels is not texels:
-            return texels.sample({None: self._levels(now)})
-        if before.pixels is now:
+            return texels.sample(self.pixels if is_tiled else {None: self._levels(self.pixels[None])})
+        if is_tiled:
+            tiles = self.pixels.items()
+            changed = {tile: values for tile, values in tiles if not _are_equal(before.pixels[tile], values)}
+            return texels.resample(before.means, changed) if changed else before.means
+        now = self.pixels[None]
+        if before.pixels[None] is now:
             return before.means
-        changed = image_pixels.changed_since(before.pixels, now)
-        return texels.follow(before.means, self._levels(now), changed)
+        box = image_pixels.changed_since(before.pixels[None], now)
+        return texels.follow(before.means, self._levels(now), box)
 
     def _levels(self, values):
         """Return the `Levels` of an image without tiles. They are kept, and updated when the image changes."""
@@ -296,10 +299,10 @@ level_cache = Cache(capacity=2)
 
 @dataclass(frozen=True, eq=False)
 class _Means:
-    """Means (S, C) of an image without tiles, and the `RootTexels` and pixels that they depend on."""
+    """Means (S, C) of an image, and the `RootTexels` and {tile: pixels} that they depend on."""
 
     texels: "maps.box_filter.RootTexels"
-    pixels: np.ndarray
+    pixels: dict
     means: np.ndarray
 
 

@@ -40,13 +40,17 @@ look_cache = Cache(capacity=4)
 
 def has_looks(state) -> bool:
     """Whether maps vary the look of a hair."""
-    return any(
-        item.setting.startswith("look.")
-        and item.setting != shared_wetness.SETTING
-        and map_items.is_set(item)
-        and varied_settings.is_used(item.setting, state.appearance.parametrization)
-        for item in state.maps
-    )
+    return any(True for _ in _maps_of_look(state))
+
+
+def _maps_of_look(state):
+    """Yield the maps of settings that the look uses, except the wetness, which is an attribute of its own."""
+    for item in state.maps:
+        is_of_look = item.setting.startswith("look.") and item.setting in varied_settings.all_varied()
+        if not is_of_look or item.setting == shared_wetness.SETTING or not map_items.is_set(item):
+            continue
+        if varied_settings.is_used(item.setting, state.appearance.parametrization):
+            yield item
 
 
 def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLooks | None, list[HairError]]:
@@ -54,20 +58,16 @@ def looks_of(hair, strands: "sources.Strands | None" = None) -> tuple[StrandLook
 
     strands: strands to return looks for; None: the stored strands. A setting with a missing source keeps its value.
     """
-    if not has_looks(hair.vellus):
+    items = list(_maps_of_look(hair.vellus))
+    if not items:
         return None, []
     if strands is None:
         strands = sources.stored_strands(hair)
     look, errors = properties.own_look_of(hair.vellus), []
     given = {}
-    for item in hair.vellus.maps:
-        section, _, name = item.setting.partition(".")
-        if section != "look" or item.setting not in varied_settings.all_varied() or not map_items.is_set(item):
-            continue
-        if item.setting == shared_wetness.SETTING or not varied_settings.is_used(item.setting, look.parametrization):
-            continue
+    for item in items:
         try:
-            given[name] = _values(strands, item)
+            given[item.setting.removeprefix("look.")] = _values(strands, item)
         except HairError as error:
             errors.append(error)
     return _followed(hair.session_uid, look, given, strands.randoms), errors

@@ -76,8 +76,8 @@ class UsdGroomWriter:
         material = usd_materials.define_material(self._stage, scope.AppendChild(curves.group_name), curves.look)
         binding, looks = UsdShade.MaterialBindingAPI.Apply(made.GetPrim()), self._variants.looks
         if looks:
-            has_color = curves.colors is not None
-            return usd_variants.define_looks(self._stage, group, made.GetPrim(), material, looks, has_color)
+            given = curves.colors is not None, curves.radial_roughness is not None
+            return usd_variants.define_looks(self._stage, group, made.GetPrim(), material, looks, *given)
         binding.Bind(material)
         return None
 
@@ -180,6 +180,9 @@ def _write_colors(prim, curves, level):
     if curves.roughness is not None:
         roughness = _array("FloatArray", level.of_points(_all(curves.roughness, curves)))
         _primvar(prim, "groom_roughness", "FloatArray", "vertex", roughness)
+    if curves.radial_roughness is not None:
+        radial = _array("FloatArray", level.of_curves(curves.radial_roughness))
+        _primvar(prim, usd_variants.RADIAL_ROUGHNESS, "FloatArray", "uniform", radial)
 
 
 def _primvar(prim, name, kind, scope, value):

@@ -21,6 +21,8 @@ LEVELS = ("full", "half", "quarter", "eighth", "sixteenth", "thirty_second")
 
 PRESENT_LOOK = "present"
 
+RADIAL_ROUGHNESS = "groom_radial_roughness"  # a primvar that is not in the specification
+
 _LEVEL, _LOOK = "lod", "look"
 
 
@@ -76,10 +78,11 @@ def define_levels(group, counts, level_count):
     return [Level(path, counts, 2**index) for index, path in enumerate(paths)]
 
 
-def define_looks(stage, group, strands, present, looks, has_color):
+def define_looks(stage, group, strands, present, looks, has_color, has_radial):
     """Define looks of the prims of a group and its strands; returns the path of the present look's variant.
 
-    present: its `UsdShade.Material`; looks: {variant: `Appearance`}; has_color: whether strands have colors.
+    present: its `UsdShade.Material`; looks: {variant: `Appearance`}; has_color, has_radial: whether strands
+    have colors, and a radial roughness that differs between them.
     """
     from pxr import UsdGeom, UsdShade
 
@@ -92,7 +95,7 @@ def define_looks(stage, group, strands, present, looks, has_color):
     for path, look in zip(paths[1:], looks.values(), strict=True):
         if has_color:
             with editing(stage, path):
-                _write_mean(strands, look)
+                _write_mean(strands, look, has_radial)
     return paths[0]
 
 
@@ -105,13 +108,17 @@ def _define(group, set_name, names):
     return [group.GetPath().AppendVariantSelection(set_name, name) for name in names]
 
 
-def _write_mean(strands, look):
-    """Write the color and roughness of a look as one value for all strands."""
+def _write_mean(strands, look, has_radial):
+    """Write the color and roughness, possibly also radial, of a look as one value for all strands."""
     from pxr import Gf, Sdf, UsdGeom
 
     color = Gf.Vec3f(*map(float, appearance.mean_color(look)))
     primvars = UsdGeom.PrimvarsAPI(strands)
     for name in ("groom_color", "displayColor"):
         primvars.CreatePrimvar(name, Sdf.ValueTypeNames.Color3fArray, UsdGeom.Tokens.constant).Set([color])
-    roughness = primvars.CreatePrimvar("groom_roughness", Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.constant)
-    roughness.Set([appearance.shaded(look).roughness])
+    shaded = appearance.shaded(look)
+    values = {"groom_roughness": shaded.roughness}
+    if has_radial:
+        values[RADIAL_ROUGHNESS] = shaded.radial_roughness
+    for name, value in values.items():
+        primvars.CreatePrimvar(name, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.constant).Set([value])

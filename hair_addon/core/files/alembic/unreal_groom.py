@@ -99,6 +99,8 @@ def _parameters(curves) -> Iterator[Parameter]:
         yield Parameter("groom_color", "float32", "vertex", _of_points(curves, curves.colors), 3, "rgb")
     if curves.roughness is not None:
         yield Parameter("groom_roughness", "float32", "vertex", _of_points(curves, curves.roughness))
+    if curves.radial_roughness is not None:  # not in the specification
+        yield Parameter("groom_radial_roughness", "float32", "uniform", [curves.radial_roughness])
 
 
 def _of_points(curves, rows):

@@ -229,10 +229,19 @@ def _arrays(some):
     columns = [curves.group_id for curves in every], [curves.curve_count for curves in every]
     arrays["ids"] = np.concatenate([curves.ids for curves in every])
     arrays["groups"] = np.repeat(np.array(columns[0], np.int32), columns[1])
+    if any(curves.radial_roughness is not None for curves in every):
+        arrays["radial_roughness"] = np.concatenate([_radial_roughness(curves) for curves in every])
     for name in ("root_uvs", "guide_ids", "guide_weights"):
         if all(getattr(curves, name) is not None for curves in every):
             arrays[name] = np.concatenate([getattr(curves, name) for curves in every])
     return arrays
+
+
+def _radial_roughness(curves):
+    """Return the radial roughness (S,) of curves, or that of their look."""
+    if curves.radial_roughness is not None:
+        return curves.radial_roughness
+    return np.full(curves.curve_count, np.nan if curves.look is None else curves.look.radial_roughness, np.float32)
 
 
 # Extension → (function of a path and curves with points, whether the format separates guides from strands).
