@@ -83,15 +83,26 @@ class Barrier:
         Raises `HairError` for non-finite points.
         """
         points = np.asarray(points, np.float64)
+        after, is_moved = self.moved_only(points, held, known_as)
+        if not is_moved.any():
+            return points, is_moved
+        corrected = points.copy()
+        corrected[is_moved] = after
+        return corrected, is_moved
+
+    def moved_only(
+        self, points: np.ndarray, held: np.ndarray | None = None, known_as: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return ((M, P, 3) float64 of the strands that are moved, (S,) bool: which), otherwise as `moved`."""
         if not np.isfinite(points).all():
             raise HairError(_NON_FINITE)
-        is_moved = np.zeros(len(points), bool)
         if self._colliders.mesh is None or not points.size:
-            return points, is_moved
+            return np.zeros((0, *points.shape[1:])), np.zeros(len(points), bool)
         device = self._colliders.device
         # Each row is a whole strand: broadcasting over three numbers takes three times as long.
-        offsets = points.reshape(len(points), -1) - np.tile(self._origin, points.shape[1])
-        original = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=device)
+        offsets, origin = np.empty(points.shape, np.float32), np.tile(self._origin, points.shape[1])
+        np.subtract(points.reshape(len(points), -1), origin, out=offsets.reshape(len(points), -1), casting="same_kind")
+        original = wp.array(offsets, dtype=wp.vec3, device=device, copy=False)
         held = np.ones(len(points), np.int32) if held is None else np.asarray(held, np.int32)
         first_moved = wp.array(np.clip(held, 1, points.shape[1]), dtype=int, device=device)
         out = wp.empty_like(original)
@@ -101,13 +112,9 @@ class Barrier:
         inputs = [Rows(original), Rows(first_moved), Rows(rows), self._surface, self._grid, *self._rim_boxes, known]
         parallel.launch(_keep_outside, len(points), inputs, [out, moved], device, least_rows=256)
         is_moved = moved.numpy() != 0
-        if not is_moved.any():
-            return points, is_moved
         before, after = original.numpy()[is_moved], out.numpy()[is_moved]
         is_same = (after == before).all(axis=2)[..., None]
-        corrected = points.copy()
-        corrected[is_moved] = np.where(is_same, points[is_moved], after + self._origin)
-        return corrected, is_moved
+        return np.where(is_same, points[is_moved], after + self._origin), is_moved
 
     def _known_of(self, known_as, point_count):
         """Return (G, P) vec4 of the last searches of points; empty if strands are not known again."""
