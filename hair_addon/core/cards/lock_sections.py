@@ -15,6 +15,7 @@ from .ribbon_charts import divided
 _SIDES = 24  # directions in which sections are measured
 _LEVELS = 17  # sections of a lock without rings
 _FLAT = 0.9999  # cosine between the normals of a flat cap's faces
+_CAP_HEIGHT = 0.05  # of a cap's middle above its ring, relative to the ring's radius, below which the cap is flat
 _SLENDER = 1.5  # least length of hair relative to its diameter
 
 
@@ -32,16 +33,16 @@ class Sections:
     vertices: np.ndarray
     sizes: np.ndarray
 
-    def places(self, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def places(self, across: np.ndarray, inset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (positions (S, K, 3), vertices (S, K)) of lines along the sections.
 
-        across: (S, 2) direction [rad] and fraction of the radius of each line.
+        across: (S, 2) direction [rad] and fraction of the radius of each line; inset: (K,) by which radii are smaller.
         """
         at = (across[:, 0] / (2.0 * np.pi) % 1.0) * _SIDES
         low = at.astype(int) % _SIDES
         share = (at - np.floor(at))[:, None]
         radii = (1.0 - share) * self.radii[:, low].T + share * self.radii[:, (low + 1) % _SIDES].T
-        radii *= across[:, 1][:, None]
+        radii = np.maximum(radii - inset, 0.0) * across[:, 1][:, None]
         cosines, sines = np.cos(across[:, 0])[:, None, None], np.sin(across[:, 0])[:, None, None]
         offsets = radii[..., None] * (cosines * self.normals + sines * self.binormals)
         return self.centers + offsets, self.vertices[:, np.round(at).astype(int) % _SIDES].T
@@ -123,8 +124,20 @@ def _rings(topology, points):
     for start in starts:
         layers = _layers(topology, start)
         if layers is not None:
-            return [(points[layer], layer) for layer in layers]
+            return [(points[layer], layer) for layer in _without_flat_ends(points, layers)]
     return None
+
+
+def _without_flat_ends(points, layers):
+    """Return layers of vertices without a single vertex at an end that is in the plane of its ring."""
+    for end, beside, inner in ((0, 1, 2), (-1, -2, -3)):
+        if len(layers[end]) == 1 and len(layers) > 3:
+            ring = points[layers[beside]]
+            axis = curve_frames.unit(ring.mean(axis=0) - points[layers[inner]].mean(axis=0))
+            height = axis @ (points[layers[end][0]] - ring.mean(axis=0))
+            if abs(height) < _CAP_HEIGHT * _size(ring):
+                layers = layers[1:] if end == 0 else layers[:-1]
+    return layers
 
 
 def _far(points, vertex):
@@ -147,7 +160,7 @@ def _cap(topology, points, end):
 def _layers(topology, start):
     """Return the vertices that are 0, 1, 2 … edges away from a start, if they are rings of one size, else None.
 
-    The first and the last layer may be a single vertex.
+    The first and the last layer may be a single vertex. Vertices inside a cap at the start belong to no ring.
     """
     ends = np.concatenate([topology.edges, topology.edges[:, ::-1]])
     is_left = np.ones(topology.vertex_count, bool)
@@ -161,6 +174,9 @@ def _layers(topology, start):
             return None
         is_left[found] = False
         layers.append(found)
+        if len(layers) == 2:
+            is_rim = np.isin(layers[0], ends[np.isin(ends[:, 1], found), 0])
+            layers[0] = layers[0][is_rim]
         if len(layers) > 3 and len(layers[-2]) != len(layers[-3]):
             return None
     sizes = [len(layer) for layer in layers]
@@ -180,7 +196,8 @@ def _of_levels(topology, points):
     share = distances[0] / np.maximum(distances[0] + distances[1], 1e-30)
     found = [(points[[first]], np.array([first]))]
     low, high = topology.edges.T
-    for level in np.arange(1, _LEVELS - 1) / (_LEVELS - 1):
+    # More sections at round ends.
+    for level in 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _LEVELS))[1:-1]:
         is_crossed = (share[low] < level) != (share[high] < level)
         if not is_crossed.any():
             return None

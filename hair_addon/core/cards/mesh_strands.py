@@ -2,7 +2,8 @@
 """Meshes of hair cards, tubes and solid locks → strands.
 
 Strands of a card run from its root end to its tip end, spread over its width with random offsets. Strands of a tube or
-a lock are evenly distributed over its cross sections, on the spiral of [Vogel79].
+a lock are evenly distributed over its cross sections, on the spiral of [Vogel79]. If they fill a tube or a lock with
+their radii, more of them are along its rim.
 """
 
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from .mesh_strand_settings import MOST_STRANDS, MeshStrandSettings
 _CLEAR = 0.1  # difference of two ends' distances to the surface, relative to the length, that determines the root
 _JITTER = 0.6  # of a strand's place, relative to the distance of strands across a card
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
+_RIM, _INSET = 2.0, 0.8  # strands at the rim relative to the root of the number, and inset relative to their radius
 _OPAQUE = 0.5  # alpha above which a texture shows hair
 _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
@@ -183,11 +185,19 @@ class _Maker:
             return
         turn = self._random.random() * 2.0 * np.pi
         order = np.arange(count)
-        found, vertices = sections.places(np.stack([turn + order * _GOLDEN, np.sqrt(order / count)], axis=1))
+        radii = sections.sizes / np.sqrt(count)
+        if self._settings.fills and count > 1:
+            # As many strands along the rim as give a smooth outline, mostly inside of it with their radii.
+            rim = round(_RIM * np.sqrt(count))
+            out, inset = np.sqrt((order + 0.5) / max(count - 0.5 * (rim + 1), 0.5)), _INSET * radii
+            out[order >= count - rim] = 1.0
+        else:
+            out, inset = np.sqrt(order / count), 0.0 * radii
+        across = np.stack([turn + order * _GOLDEN, np.minimum(out, 1.0)], axis=1)
+        found, vertices = sections.places(across, inset)
         corners = np.empty(len(piece.vertices), np.int64)
         triangle, corner = np.nonzero(piece.first_corners)
         corners[piece.topology.triangles[triangle, corner]] = 3 * piece.faces[triangle] + corner
-        radii = sections.sizes / np.sqrt(count)
         stations = found.shape[1]
         self._parts.append((False, count, stations, radii, found.reshape(-1, 3), corners[vertices].ravel()))
 

@@ -143,6 +143,39 @@ def test_strands_of_a_tube_stay_between_its_flat_sides(sides):
     assert (reach.max(axis=0) > 0.75).all() and reach.max() < 1.02
 
 
+@pytest.mark.parametrize("has_fans", [False, True])
+def test_strands_that_fill_a_tube_have_its_outline(has_fans):
+    """Seen from aside, strands that fill a closed tube cover it from rim to rim and end to end, and little beside it.
+
+    With fans of triangles as caps, whose middles are on no ring, as with ends of many sides.
+    """
+    straight = np.stack([np.zeros(9), np.zeros(9), np.linspace(0.1, 0.4, 9)], axis=1)[None].astype(np.float32)
+    mesh = triangulated(
+        tubes.tubes(straight, np.full((1, 9), 0.01), TubeSettings(tube_count=0, side_count=12, point_count=9))
+    )
+    if has_fans:
+        is_cap = np.ptp(mesh.vertices[mesh.triangles][:, :, 2], axis=1) < 1e-6
+        middles = np.float32([straight[0, 0], straight[0, -1]])
+        sides = [np.arange(12) + first for first in (0, 96)]
+        fans = [
+            np.stack([np.full(12, 108 + end), *((rim, np.roll(rim, -1)) if end else (np.roll(rim, -1), rim))], axis=1)
+            for end, rim in enumerate(sides)
+        ]
+        mesh = TriMesh(
+            np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.triangles[~is_cap], *fans]).astype(np.int32)
+        )
+    found = made(mesh, strand_count=40, fills=True)
+    for row in (found.starts[:-1], found.starts[1:] - 1):
+        assert np.ptp(found.points[row, 2]) < 1e-6
+    at_ends = found.points[[0, found.starts[1] - 1], 2]
+    np.testing.assert_allclose(at_ends, [0.1, 0.4], atol=1e-4)
+    for direction in np.arange(12) * (np.pi / 6.0):
+        aside = found.points[found.starts[:-1] + 4, :2] @ [np.cos(direction), np.sin(direction)]
+        low, high = np.sort(aside - found.radii[4]), np.sort(aside + found.radii[4])
+        assert np.all(low[1:] < np.maximum.accumulate(high)[:-1])  # without a gap
+        assert 0.0092 < high.max() < 0.0108
+
+
 def test_the_axis_of_a_solid_lock_runs_from_the_surface_to_its_tip():
     """A long ellipsoid without rings gives strands inside of it, from its end at the surface to its other end."""
     ball = sphere(1.0)
