@@ -4,9 +4,10 @@
 .venv/bin/python tests/benchmarks/viewports/light_of_voxels.py --seeds 911 919 --cycles OPTIX --device cuda
 
 Prints the error of means of 12 × 12 pixels in display levels of 255, the structural similarity, the ratio of mean
-colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS: factors of the number of paths, the weight of larger
-voxels in paths (0: by the number of paths), and a factor of the number of voxels; "live" is the light of a viewport
-after one second at rest. Cycles' pictures are the means of two halves, whose difference is its own noise.
+colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS[:SEED]: factors of the number of paths, the weight of
+larger voxels in paths (0: by the number of paths), a factor of the number of voxels, and the random seed of the paths;
+"live" is the light of a viewport after one second at rest. Cycles' pictures are the means of two halves, whose
+difference is its own noise.
 """
 
 import argparse
@@ -52,7 +53,7 @@ def main():
     parser.add_argument("--samples", type=int, default=1024, help="samples per pixel of each half of Cycles' pictures")
     parser.add_argument("--cycles", default="CPU", choices=("CPU", "CUDA", "OPTIX", "METAL"), help="Cycles' device")
     parser.add_argument("--device", default="cpu", help="the Warp device that follows paths")
-    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS, or live")
+    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS[:SEED], or live")
     parser.add_argument("--limit", type=float, default=130.0, help="time [s] after which no further scene begins")
     parser.add_argument("--out", type=Path, help="write all pictures to this .npz file")
     options = parser.parse_args()
@@ -141,14 +142,14 @@ def at_rest(drawn, camera, count):
 
 def traced(drawn, camera, count, variant):
     """Return (scene lit by paths with the settings of a variant, time [s])."""
-    factor, prior, voxels = map(float, variant.split(":"))
+    factor, prior, voxels, seed = map(float, f"{variant}:0".split(":")[:4])
     voxel_means.prior_of = (lambda _paths: prior) if prior else _prior_of
     default_voxels, most_voxels = strand_grid.build.__defaults__, strand_grid.MOST_VOXELS
     strand_grid.build.__defaults__ = default_voxels[0], int(voxels * default_voxels[1]), *default_voxels[2:]
     strand_grid.MOST_VOXELS = int(np.ceil(voxels ** (1.0 / 3.0)) * most_voxels)
     started = time.perf_counter()
     try:
-        lit = light_paths.with_grid(drawn, *camera, int(factor * count))
+        lit = light_paths.with_grid(drawn, *camera, int(factor * count), int(seed))
     finally:
         strand_grid.build.__defaults__, strand_grid.MOST_VOXELS = default_voxels, most_voxels
     return lit, time.perf_counter() - started

@@ -18,7 +18,7 @@ from ...kernels.checks import require_count, require_indices
 from ...long_work import Progress, no_progress, part_of
 from . import grid_walk, start_places, view, voxel_means, voxel_sums
 from .fibre_walk import even_return, turn
-from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
+from .grid_walk import PASSED, STRAND, Medium, fibre_of, on_axis, walk
 from .lamp_light import Event, light_at_hit, light_at_once, light_by_share
 from .light_sources import Sources, across
 from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of
@@ -75,7 +75,7 @@ def _gather(
                 here.own = medium.strands[hit.index]
                 here.offset = -hit.offset
                 if event == 0:
-                    out_position[path] = hit.position
+                    out_position[path] = on_axis(medium, hit.index, hit.position)
                     out_even[path] = even_return(here.fibre, here.facing)
                     light_there, lamp_state = light_at_once(medium, sources, here, lamp_state)
                 else:

@@ -352,3 +352,12 @@ def place_on(medium: Medium, segment: int, part: float, offset: float, direction
     hit.offset = offset
     hit.position = start + part * along + radius * (offset * sideways - rise * inwards)
     return hit
+
+
+@wp.func
+def on_axis(medium: Medium, segment: int, place: wp.vec3):
+    """Return the point of a segment's axis that is nearest to a place."""
+    start = medium.points[segment]
+    along = medium.points[segment + 1] - start
+    part = wp.dot(place - start, along) / wp.max(wp.dot(along, along), 1e-30)
+    return start + wp.clamp(part, 0.0, 1.0) * along
