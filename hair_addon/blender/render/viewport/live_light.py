@@ -410,10 +410,13 @@ class LiveLight:
     def _share_of(self, goal):
         """Return the number of paths of the next share; goal: paths of the picture."""
         share = min(max(goal // _SHARES, _LEAST_SHARE), _MOST_SHARE)
+        is_on_gpu = self._paths is not None and not self._paths.grid.device.is_cpu
+        if is_on_gpu:
+            share = _MOST_SHARE  # fewer take as long
         if self._tried < goal or self._paths is None:
             return share
         grown = int(_GROWTH * self._tried)
-        if not self._paths.grid.device.is_cpu:
+        if is_on_gpu:
             grown = min(int(_GROWTH_ON_GPU * self._tried), _MOST_ON_GPU)
         return max(share, min(grown, int(self._most - self._tried)))
 
