@@ -42,6 +42,13 @@ def most_paths(device, count, step_count=1):
     return most if device.is_cpu else max(most, min(_MOST_TIMES_ON_GPU * count, _MOST_ON_GPU // step_count))
 
 
+def most_paths_at_rest(device, count):
+    """Return the maximum number of paths on a Warp device for a viewport at rest, whose hair has `count` paths at
+    first: a GPU adds paths between redraws, however small the hair is.
+    """
+    return _MOST_TIMES * count if device.is_cpu else max(_MOST_TIMES * count, _MOST_ON_GPU)
+
+
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress, step_count=1):
     """Return a `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4)
     matrices. step_count: of a frame with motion blur, whose mean has less noise than a step.

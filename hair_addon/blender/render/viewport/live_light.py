@@ -504,7 +504,7 @@ class LiveLight:
     @property
     def _most(self):
         """The maximum number of paths of the picture."""
-        return light_paths.most_paths(self._paths.grid.device, self._goal)
+        return light_paths.most_paths_at_rest(self._paths.grid.device, self._goal)
 
     def _part(self):
         """Return the part of the picture's light that is measured light, from 0 to 1."""

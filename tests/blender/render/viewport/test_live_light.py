@@ -110,12 +110,14 @@ def test_paths_are_added_at_rest_while_voxels_are_noisy(view, monkeypatch):
     assert live.is_slow and most > 2 * live._goal and most <= live._paths.taken < 2.0 * most
 
 
-def test_a_gpu_has_as_many_paths_in_shares_of_small_pictures_as_in_those_of_large_ones():
-    """Fewer paths take a GPU as long, so small pictures would only get their light later."""
+def test_a_gpu_traces_as_many_paths_for_small_pictures_as_for_large_ones():
+    """Fewer paths take a GPU as long, so small pictures, or hair in a small part of them, would only get noisier."""
     live = live_light.LiveLight()
-    for is_cpu, expected in ((True, [1250, 16_384]), (False, [16_384, 16_384])):
+    for is_cpu, shares, most in ((True, [1250, 16_384], 80_000), (False, [16_384, 16_384], 2_400_000)):
+        live._goal = 20_000
         live._paths = SimpleNamespace(grid=SimpleNamespace(device=SimpleNamespace(is_cpu=is_cpu)))
-        assert [live._share_of(count) for count in (20_000, 300_000)] == expected
+        assert [live._share_of(count) for count in (20_000, 300_000)] == shares
+        assert live._most == most
 
 
 def test_the_picture_goes_over_to_paths_in_steps(view):
