@@ -102,15 +102,13 @@ def test_white_hair_on_a_white_floor_is_lost_in_a_white_world(rng):
 
 
 def test_paths_count_for_the_voxels_of_axes_where_their_light_is_looked_up():
-    """Paths start on the surface of a strand that is wider than a voxel, and are added to voxels on its axis."""
-    axis = np.array([[[-0.5, 0.03, 0.02], [0.5, 0.03, 0.02]], [[-0.5, 0.9, 0.9], [0.5, 0.9, 0.9]]])
-    grid = grid_of(axis, BLACK, radius=0.1, voxel_count=20_000)
+    """Paths start on both sides of a border of voxels, on the surface of a wide strand, and count on its axis."""
+    axis = np.array([[[-0.5, 0.02, 0.02], [0.5, 0.02, 0.02]]])
+    grid = grid_of(axis, BLACK, radius=0.1)
     (found,) = found_by(grid, surroundings(world=0.7), ALONG_Y, 10_000)
     z, y, _x = np.nonzero(found[..., 3])
-    on_axis = np.floor((axis[:, 0] - grid.corner) / grid.voxel).astype(int)
-    assert grid.voxel < 0.1 and {(int(row), int(layer)) for row, layer in zip(y, z, strict=True)} == {
-        (int(row), int(layer)) for _x, row, layer in on_axis
-    }
+    _x, row, layer = np.floor((axis[0, 0] - grid.corner) / grid.voxel)
+    assert len(y) and (y == row).all() and (z == layer).all()
 
 
 def test_paths_are_the_same_again(rng):
