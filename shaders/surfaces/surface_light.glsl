@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Light from a point of a surface with a Principled BSDF: diffuse below a rough dielectric, or metal.
 
+#include "light/irradiance.glsl"
 #include "shadows/surface_visibility.glsl"
 #include "light/world.glsl"
 #include "surfaces/surface_colors.glsl"
@@ -43,14 +44,7 @@ SurfaceLight surface_light(SurfacePoint point, vec2 turn)
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, point.position);
     SurfaceVisibility seen = surface_visibility(light, point.position, N, view.hair_forward.rgb, turn);
     if (any(greaterThan(seen.past_hair, vec3(0.0)))) {
-      vec3 facing = light_irradiance(light.kind,
-                                     light.position.xyz,
-                                     light.axis.xyz,
-                                     light.power.rgb,
-                                     light.cos_cone,
-                                     light.blend,
-                                     light.radius,
-                                     point.position);
+      vec3 facing = irradiance_of(light, point.position);
       // A plane receives less light of a wide lobe than a ball, on average by the lobe's variance.
       float blur = light_blur(light.kind, light.position.xyz, light.radius, point.position);
       variance += seen.variance * squared_mean(facing);

@@ -15,6 +15,7 @@ from ..data.pictures.shader_sockets import ShaderInput, shown_shader
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn, say
+from . import light_patterns
 from .programs import uniforms
 from .studio_lights import StudioImage, image_of
 
@@ -26,29 +27,32 @@ frame_cache = Cache()  # session_uid of a sequence or movie → the loaded frame
 _RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
 
 
-NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), []  # the result of `read_lights` without lights
+NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), [], []  # the result of `read_lights` without lights
 
 
 def read_lights(depsgraph, for_render, places=()):
-    """Return ((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links).
+    """Return ((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links; patterns).
 
-    The links are from `light_linking.read_links`. Lights with non-finite values are skipped with a message. places:
-    (P, 3) of hair, for lights whose nodes Cycles renders. Raises `HairError` if it cannot, for a render.
+    The links are from `light_linking.read_links`, the patterns are `Panorama`s of lights by their layer. Lights with
+    non-finite values are skipped with a message. places: (P, 3) of hair, for lights whose nodes Cycles renders. Raises
+    `HairError` if it cannot, for a render.
     """
     time = scene_time.time_of(depsgraph.scene_eval)
-    lights, links = [], []
+    lights, links, patterns = [], [], []
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and _shines(instance, for_render):
             with np.errstate(all="ignore"):  # values are checked below
                 matrix = np.array(instance.matrix_world)
-                light = _read_light(
-                    instance.object.data, matrix, _panorama_of_light(instance, time, for_render), places
-                )
+                panorama = _panorama_of_light(instance, time, for_render)
+                light = _read_light(instance.object.data, matrix, panorama, places)
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
                 light["group"] = group_of(instance.object, depsgraph.view_layer)
+                if panorama is not None and light["kind"] != lamps.SUN and len(patterns) < uniforms.LIGHT_CAPACITY:
+                    light_patterns.write(light, panorama, matrix, panorama.factor(matrix, places), len(patterns))
+                    patterns.append(panorama)
                 lights.append(light)
                 links.append(light_linking.read_links(instance.object.original))
-    return np.array(lights, uniforms.LIGHT.dtype), links
+    return np.array(lights, uniforms.LIGHT.dtype), links, patterns
 
 
 def group_of(owner, view_layer):

@@ -30,7 +30,8 @@ class SceneLights:
 
     record: `uniforms.LIGHTS`, to which `ShadowMaps.draw` adds its part; links: of each of its lights, from
     `light_linking.read_links`; rest, rest_links: `uniforms.LIGHT` records of the light beyond the capacity, and their
-    links; lamps: records of all lamps, without bright parts of the world.
+    links; lamps: records of all lamps, without bright parts of the world; patterns: `light_panoramas.Panorama` of each
+    layer of patterns.
     """
 
     record: np.ndarray
@@ -38,6 +39,7 @@ class SceneLights:
     rest: np.ndarray
     rest_links: list
     lamps: np.ndarray
+    patterns: list
 
     def lit(self, receivers):
         """Return (R,) `uniforms.LIGHTS`, for each `Receiver`: without unlinked lights, and with `rest` as ambient
@@ -76,8 +78,8 @@ class SceneLights:
         return chosen
 
 
-def gather(found, links, world, receivers):
-    """Return the `SceneLights` of the lights and links of `lights.read_lights`, and of a `World`.
+def gather(found, links, patterns, world, receivers):
+    """Return the `SceneLights` of the lights, links and patterns of `lights.read_lights`, and of a `World`.
 
     receivers: of the hair, by which the importance of lights is computed.
     """
@@ -104,7 +106,7 @@ def gather(found, links, world, receivers):
     record = uniforms.LIGHTS.record()
     record["light"][:count], record["count"] = found[:count], count
     record["world"][:, :3] = sides
-    return SceneLights(record, links[:count], rest, rest_links, own)
+    return SceneLights(record, links[:count], rest, rest_links, own, patterns)
 
 
 # Lights of Solid shading that are drawn one by one: they may follow the view, which draws their maps with each turn.
@@ -126,7 +128,7 @@ def of_studio(found, ambient):
     record["light"][:count]["power"][:, :3] *= one_by_one[:count, None]
     record["world"][:, :3] = ambient
     record["world"][:, :3] += lamps.ambient_sides(rest, np.zeros((1, 3)))
-    return SceneLights(record, [(ALL, ALL)] * count, found[:0], [], found)
+    return SceneLights(record, [(ALL, ALL)] * count, found[:0], [], found, [])
 
 
 def _importance(found, links, receivers):

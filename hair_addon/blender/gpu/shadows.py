@@ -6,7 +6,7 @@ from dataclasses import replace
 import gpu
 import numpy as np
 
-from . import drawing, level_of_detail, strand_batches, surface_textures
+from . import drawing, level_of_detail, light_patterns, strand_batches, surface_textures
 from .programs import scene_programs, shadow_programs, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/light/lights.glsl
@@ -45,6 +45,7 @@ class ShadowMaps:
 
     def __init__(self, size, layer_count, in_compute=None, is_wide=False):
         self._size, self.layer_count, self.is_wide = size, layer_count, is_wide
+        self.patterns = []  # panoramas of the lights' patterns
         self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, 2 * layer_count if is_wide else layer_count, "RGBA32F")
@@ -68,8 +69,9 @@ class ShadowMaps:
 
     @property
     def samplers(self):
-        """{sampler: texture} for the shaders that receive shadows."""
-        textures = (self._hair_front, self._hair_layers, self._surface_moments)
+        """{sampler: texture} for the shaders that receive shadows and patterns of lights."""
+        patterns = light_patterns.texture_of(self.patterns)
+        textures = (self._hair_front, self._hair_layers, self._surface_moments, patterns)
         return dict(zip(scene_programs.SHADOW_SAMPLERS, textures, strict=True))
 
     def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None):

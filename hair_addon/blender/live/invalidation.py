@@ -17,7 +17,16 @@ from ..data.pictures import (
 )
 from ..data.simulation import simulated_world
 from ..data.strands import simulated_guides
-from ..gpu import light_grid, lights, solid_shading, studio_lights, surface_shading, surface_textures, world_texture
+from ..gpu import (
+    light_grid,
+    light_patterns,
+    lights,
+    solid_shading,
+    studio_lights,
+    surface_shading,
+    surface_textures,
+    world_texture,
+)
 from ..gpu.programs import shaders
 from ..groom import bindings, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
@@ -121,6 +130,7 @@ OTHERS = (
     notices.printed_cache,
     surface_bakes.bake_cache,
     light_panoramas.picture_cache,
+    light_patterns.texture_cache,
     picture_jobs.job_cache,
     picture_jobs.last_cache,
     guide_lines.hue_cache,

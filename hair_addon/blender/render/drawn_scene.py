@@ -296,6 +296,7 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
     hair_owners = [receiver.owner for receiver in hair_receivers]
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, solid, [blocker.owner for blocker in drawn.blockers])
+    maps.patterns = lamps.patterns
     # If the GPU makes strands, shadows are the same at rest as in motion.
     maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
     if maps.is_wide and (sphere := _sphere_around_hair(drawn)) is not None:

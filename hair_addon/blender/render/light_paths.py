@@ -10,7 +10,7 @@ from ...core.long_work import no_progress, part_of
 from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
-from ..gpu import drawing, light_grid, world_texture
+from ..gpu import drawing, light_grid, light_patterns, world_texture
 from ..settings import preferences
 from . import seen_strands
 
@@ -201,4 +201,5 @@ def surroundings_of(drawn):
         world_texture.picture_of(drawn.world),
         gloss,
         np.concatenate([np.zeros(0, bool), *is_seen]),
+        light_patterns.of_paths(drawn.lamps.patterns),
     )

@@ -40,7 +40,7 @@ def told():
 
 
 def record():
-    (found,), _links = lights.read_lights(bpy.context.evaluated_depsgraph_get(), True)
+    (found,), *_others = lights.read_lights(bpy.context.evaluated_depsgraph_get(), True)
     return found
 
 

@@ -171,7 +171,7 @@ def test_another_process_renders_a_light_once(scene):
     lamp = add_light(scene, "POINT", aslant(1.0, -1.0, 1.5), mixed)
 
     def power():
-        (found,), _links = lights.read_lights(bpy.context.evaluated_depsgraph_get(), True, PLACE)
+        (found,), *_others = lights.read_lights(bpy.context.evaluated_depsgraph_get(), True, PLACE)
         return found["power"][:3]
 
     lit = power()

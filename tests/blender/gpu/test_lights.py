@@ -129,7 +129,7 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
         settings = {"size": SMALL, "size_y": 2.0 * SMALL, **settings}
     add_light(wall, kind, matrix, **settings)
     rendered = cycles_irradiance(wall, tmp_path)
-    found, _links = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
+    found, *_others = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
     assert len(found) == 1
     lights = uniforms.LIGHTS.record()
     lights["light"][:1] = found

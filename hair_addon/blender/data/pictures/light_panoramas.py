@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of lamps whose nodes Vellus does not read: Cycles renders a panorama of it once, and hair receives its mean."""
+"""Light of lamps whose nodes Vellus does not read: Cycles renders a panorama of it once, which is their pattern."""
 
 import hashlib
 import zipfile
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ...host.caches import Cache
 from . import kept_files, picture_jobs, unread_nodes, world_digest, world_panoramas
 from .shader_sockets import nodes_of
+
+SIZE = 1024, 512  # pixels of patterns
+COARSE_SIZE = 64, 32  # pixels of the first panorama in viewports
+_TINY = 1e-4  # light without nodes, relative to the brightest direction, below which nodes are not seen
+_LEAST = 1e-3  # factor of a lamp's power, relative to its brightest direction
+_BRIGHTEST = 6e4  # within the range of half floats
 
 picture_cache = Cache(capacity=64)  # path → `Panorama`
 
@@ -28,11 +35,28 @@ class Panorama:
     lit: np.ndarray
     plain: np.ndarray
 
+    @cached_property
+    def pattern(self):
+        """(height, width, 3) float32 of `SIZE`: light with nodes relative to that without them, in each direction."""
+        ratio = self.lit / np.maximum(self.plain, _TINY * self.plain.max() + 1e-30)[..., None]
+        ratio = np.clip(ratio, 0.0, _BRIGHTEST).astype(np.float32)
+        rows, columns = (np.arange(side) * count // side for side, count in zip(SIZE[::-1], ratio.shape, strict=False))
+        return ratio[rows[:, None], columns]
+
+    @staticmethod
+    def axes(matrix):
+        """Unit axes (3, 3) of a lamp with a matrix (4, 4), one in each column."""
+        return matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+
     def factor(self, matrix, places):
         """Return RGB, the light that nodes let arrive at places (P, 3) relative to that without them, in the mean.
 
-        matrix: (4, 4) of the lamp. Without places or light at these, the mean of all directions.
+        matrix: (4, 4) of the lamp. Without places or light at these, the mean of all directions. It is positive, unless
+        a channel is dark in all directions: other places may have light.
         """
+        return np.maximum(self._mean(matrix, places), _LEAST * self.pattern.max(axis=(0, 1)))
+
+    def _mean(self, matrix, places):
         lit, plain = self._arriving(matrix, places)
         if not plain > 0.0:
             rows = len(self.plain)
@@ -42,7 +66,7 @@ class Panorama:
 
     def _arriving(self, matrix, places):
         offsets = np.reshape(places, (-1, 3)) - matrix[:3, 3]
-        axes = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+        axes = self.axes(matrix)
         distances = np.maximum(np.linalg.norm(offsets, axis=1), 1e-6)
         x, y, z = ((offsets @ axes) / distances[:, None]).T
         height, width = self.plain.shape
@@ -68,7 +92,7 @@ def find(light, matrix, frame, waits):
     is_placed = any(node.type in _WORLD_NODES for node in nodes_of(light.node_tree))
     rows = (matrix if is_placed else np.eye(4)).tolist()
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
-    found.update(repr((rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
+    found.update(repr((SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
     made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
     path = made or picture_jobs.last_of(light)

@@ -6,7 +6,8 @@ import gpu
 from . import uniforms
 from .shaders import COLOR, cached, compile_compute, compile_drawing
 
-SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
+# Textures of lamps: their shadow maps and patterns.
+SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments", "light_patterns")
 # See shaders/light/world_visibility.comp.
 VISIBILITY_SAMPLERS = (
     "visibility_x_y",

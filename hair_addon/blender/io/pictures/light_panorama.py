@@ -9,13 +9,11 @@ import numpy as np
 from mathutils import Matrix
 
 from ....core.errors import HairError, cause_of
-from ...data.pictures import shader_sockets, unsaved_images
+from ...data.pictures import light_panoramas, shader_sockets, unsaved_images
 from ...host import scene_time
 from . import world_panorama
 
-SIZE = 256, 128  # pixels
-COARSE_SIZE = 64, 32  # pixels of the first picture in viewports
-SAMPLES = 8  # per pixel
+SAMPLES = 4  # per pixel
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
 _ENERGY = 1e6  # of the light, for pixels of about one
 
@@ -53,7 +51,8 @@ def render(path, name, matrix, frame, is_coarse, out):
     camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
     size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
     camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
-    world_panorama.set_up(scene, SAMPLES, COARSE_SIZE if is_coarse else SIZE)
+    size = light_panoramas.COARSE_SIZE if is_coarse else light_panoramas.SIZE
+    world_panorama.set_up(scene, SAMPLES, size)
     scene.cycles.max_bounces = 0
     scene_time.go_to_time(scene, frame)
     part = Path(out).with_suffix(".part.exr")

@@ -24,6 +24,10 @@ class Sources:
     power: wp.array[wp.vec3]
     shape: wp.array[wp.vec4]  # radius, cos_cone, blend, whether it casts shadows
     chance: wp.array[float]  # probability of being chosen
+    pattern: wp.array[int]  # index of the lamp's pattern, from one; 0 without a pattern
+    pattern_axes: wp.array2d[wp.vec3]  # the lamp's axes, and RGB factors of its pattern
+    patterns: wp.array2d[wp.vec3]  # rows of all patterns, by latitude and longitude around the lamp's axes
+    pattern_rows: int  # of each pattern
     world: World
     faint: float  # sum of RGB at the viewer below which shadow rays are traced at random
 
@@ -99,6 +103,25 @@ def choose(sources: Sources, random: wp.uint32):
 
 
 @wp.func
+def _pattern(sources: Sources, chosen: int, direction: wp.vec3):
+    """Light in a unit direction from a lamp, relative to the lamp's power, as in shaders/light/irradiance.glsl."""
+    found = wp.vec3(1.0, 1.0, 1.0)
+    index = sources.pattern[chosen]
+    if index > 0:
+        x = wp.dot(direction, sources.pattern_axes[chosen, 0])
+        y = wp.dot(direction, sources.pattern_axes[chosen, 1])
+        z = wp.dot(direction, sources.pattern_axes[chosen, 2])
+        width = sources.patterns.shape[1]
+        u = 0.5 - wp.atan2(y, x) / (2.0 * PI)
+        v = 0.5 + wp.asin(wp.clamp(z, -1.0, 1.0)) / PI
+        row = wp.clamp(int(v * float(sources.pattern_rows)), 0, sources.pattern_rows - 1)
+        column = wp.clamp(int(u * float(width)), 0, width - 1)
+        texel = sources.patterns[(index - 1) * sources.pattern_rows + row, column]
+        found = wp.cw_mul(texel, sources.pattern_axes[chosen, 3])
+    return found
+
+
+@wp.func
 def _sent(sources: Sources, chosen: int, offset: wp.vec3, lit: Lit, least: float):
     """Return a `Lit` completed by irradiance and density.
 
@@ -122,7 +145,8 @@ def _sent(sources: Sources, chosen: int, offset: wp.vec3, lit: Lit, least: float
         squared = lit.distance * lit.distance
         near = wp.dot(offset, offset) + shape[0] * shape[0]
         dim = wp.min(1.0, near / (least * least))
-        lit.irradiance = (dim * part * facing / squared) * sources.power[chosen]
+        power = wp.cw_mul(sources.power[chosen], _pattern(sources, chosen, -wp.normalize(offset)))
+        lit.irradiance = (dim * part * facing / squared) * power
         lit.density = squared / (wp.max(facing, 1e-6) * area)
     return lit
 

@@ -26,7 +26,9 @@ class Surroundings:
     albedo: (F, 3) base colors; lamps: (N,) records with the fields of `Light` in shaders/light/lights.glsl; importance:
     (N,) mean irradiance of lamps; world: (H, W, 3) radiance, an equirectangular picture as in
     core/imaging/environment.py; gloss: (F, 3) roughness, metallic, and reflectance at normal incidence of triangles,
-    None if all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None if all do.
+    None if all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None if all do; patterns:
+    (L, H, W, 3) light of lamps by latitude and longitude around their axes, by their `pattern_layer`, None if no
+    lamp has a pattern.
     """
 
     corners: np.ndarray
@@ -37,6 +39,7 @@ class Surroundings:
     world: np.ndarray
     gloss: np.ndarray | None = None
     is_seen: np.ndarray | None = None
+    patterns: np.ndarray | None = None
 
 
 def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLike) -> None:
@@ -104,6 +107,17 @@ def sources_of(surroundings: Surroundings, faint: float) -> Sources:
     )
     shape = np.stack([lamps[name] for name in ("radius", "cos_cone", "blend", "casts_shadow")], axis=-1)
     sources.shape = wp.array(shape.astype(np.float32).reshape(-1, 4), dtype=wp.vec4)
+    patterns = np.zeros((0, 1, 1, 3)) if surroundings.patterns is None else surroundings.patterns
+    layers = lamps["pattern_layer"].astype(np.int32)
+    if layers.max(initial=0) > len(patterns):
+        raise ValueError(f"a lamp has pattern {layers.max()} of {len(patterns)}")
+    sources.pattern, sources.pattern_rows = wp.array(layers, dtype=int), patterns.shape[1]
+    # A record has the axes by columns: see `uniforms.Block`.
+    axes = np.ascontiguousarray(lamps["pattern"][:, :, :3], np.float32)
+    axes[:, :3] = axes[:, :3].swapaxes(1, 2)
+    sources.pattern_axes = wp.array(axes, dtype=wp.vec3, shape=(len(lamps), 4))
+    rows = np.ascontiguousarray(patterns, np.float32).reshape(-1, patterns.shape[2], 3)
+    sources.patterns = wp.array(rows, dtype=wp.vec3, shape=rows.shape[:2])
     # Give every lamp a non-zero probability: the irradiance may differ elsewhere.
     importance = np.asarray(surroundings.importance, float)
     chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance

@@ -17,7 +17,8 @@ from tests.core.shading.tables.test_light_in_fur import walked
 
 _NUMBERS = [(name, "f4") for name in ("radius", "cos_cone", "blend")]
 _VECTORS = [(name, "f4", 4) for name in ("position", "axis", "power")]
-LAMP = np.dtype([("kind", "i4"), *_VECTORS, *_NUMBERS, ("casts_shadow", "i4")])
+_PATTERN = [("pattern", "f4", (4, 4)), ("pattern_layer", "i4")]
+LAMP = np.dtype([("kind", "i4"), *_VECTORS, *_NUMBERS, ("casts_shadow", "i4"), *_PATTERN])
 NO_LAMPS = np.zeros(0, LAMP)
 WHITE, BLACK = (0.0, 0.0, 0.0), (1e4, 1e4, 1e4)
 

@@ -52,12 +52,28 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     np.testing.assert_allclose(found[0], found[1], rtol=0.04)
 
 
-def light_on_a_strand(light, path_count=20_000):
+def light_on_a_strand(light, path_count=20_000, patterns=None):
     """Return the `ratio` of a thin strand at the origin that a lamp lights, seen along y."""
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
     grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, voxel_count=125)
     seen_in = level_view((0.0, -0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.02, 0.004), 0.2)
-    return ratio(found_by(grid, surroundings(lamps=light), seen_in, path_count))
+    return ratio(found_by(grid, replace(surroundings(lamps=light), patterns=patterns), seen_in, path_count))
+
+
+def test_a_pattern_scales_light_in_its_directions():
+    """A pattern of two halves along an axis of the lamp scales light by its value toward the strand."""
+    plain = light_on_a_strand(lamp(lamps.POINT, 5.0, 0.01, 300.0), 4_000)
+    pattern = np.zeros((1, 32, 64, 3), np.float32)
+    pattern[0, 16:] = 2.0, 1.0, 0.5  # directions along the z axis
+    for sign, factor in ((1.0, [1.0, 0.5, 0.25]), (-1.0, [0.0, 0.0, 0.0])):
+        turned = lamp(lamps.POINT, 5.0, 0.01, 300.0)
+        turned["pattern_layer"] = 1
+        turned["pattern"][0, :3, :3] = np.transpose([[1, 0, 0], [0, 0, 1], [0, sign, 0]])  # z toward the strand
+        turned["pattern"][0, 3, :3] = 0.5
+        np.testing.assert_allclose(light_on_a_strand(turned, 4_000, pattern), np.multiply(factor, plain), rtol=1e-3)
+    turned["pattern_layer"] = 2
+    with pytest.raises(ValueError, match="pattern 2 of 1"):
+        light_on_a_strand(turned, 4_000, pattern)
 
 
 def test_near_a_lamp_light_grows_as_its_disk_does():
