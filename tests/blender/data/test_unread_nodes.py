@@ -96,10 +96,10 @@ def test_other_nodes_of_lights_are_named(lamp):
     link(light.node_tree, "ShaderNodeTexNoise", emission.inputs["Color"])
     falloff = link(light.node_tree, "ShaderNodeLightFalloff", emission.inputs["Strength"])
     (sentence,) = told()
-    assert sentence.endswith(f'toward hair: "{light.name}" (Noise Texture).')
+    assert sentence.endswith(f'on hair and surfaces: "{light.name}" (Noise Texture).')
     light.node_tree.links.new(falloff.outputs["Linear"], emission.inputs["Strength"])
     sentence, about_distance = told()
-    assert sentence.endswith(f'toward hair: "{light.name}" (Noise Texture, Light Falloff).')
+    assert sentence.endswith(f'on hair and surfaces: "{light.name}" (Noise Texture, Light Falloff).')
     assert about_distance.endswith(f'at all distances: "{light.name}" (Light Falloff).')
     bpy.context.object.hide_render = True
     assert told() == []
@@ -129,12 +129,12 @@ def test_very_long_chains_and_very_large_numbers_are_not_read(lamp, monkeypatch)
     for _sum in range(600):
         node = link(light.node_tree, "ShaderNodeMath", node.inputs[0])
     (sentence,) = told()
-    assert sentence.endswith(f'toward hair: "{light.name}" (Math).')
+    assert sentence.endswith(f'on hair and surfaces: "{light.name}" (Math).')
     light.node_tree.links.remove(first.inputs[0].links[0])
     assert told() == []
     first.operation, first.inputs[0].default_value, first.inputs[1].default_value = "MULTIPLY", 1e30, 1e30
     (sentence,) = told()
-    assert sentence.endswith(f'toward hair: "{light.name}" (Math).')
+    assert sentence.endswith(f'on hair and surfaces: "{light.name}" (Math).')
     assert np.isfinite(record()["power"]).all()
 
 
