@@ -84,7 +84,7 @@ def using_mesh(
         found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, part_of(progress, 0.0, 0.5))
         colored = pieces.colors(found.places)
         if settings.uses_alpha and (colored[:, 3] < 1.0).any():
-            found = mesh_strands.shown(found, colored[:, 3])
+            found = mesh_strands.shown(found, colored[:, 3], lambda places: pieces.colors(places)[:, 3], mesh)
             colored = pieces.colors(found.places)
         means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
         if settings.reaches_surface:

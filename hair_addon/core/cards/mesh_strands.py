@@ -6,6 +6,7 @@ a lock are evenly distributed over its cross sections, on the spiral of [Vogel79
 their radii, more of them are along its rim.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +25,7 @@ _JITTER = 0.6  # of a strand's place, relative to the distance of strands across
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
 _RIM, _INSET = 2.0, 0.8  # strands at the rim relative to the root of the number, and inset relative to their radius
 _OPAQUE = 0.5  # alpha above which a texture shows hair
+_HALVINGS = 4  # of a segment in which a texture ends
 _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
@@ -260,20 +262,55 @@ def _distances(surface, points):
     return np.linalg.norm(points.astype(np.float64) - near, axis=1)
 
 
-def shown(strands: MeshStrands, alpha: np.ndarray) -> MeshStrands:
+def shown(
+    strands: MeshStrands, alpha: np.ndarray, alpha_at: Callable[[SurfacePoints], np.ndarray], mesh: TriMesh
+) -> MeshStrands:
     """Return strands that end where a texture becomes transparent, without mostly transparent strands.
 
-    alpha: (N,) in [0, 1] at the points. Raises `HairError` if no strand is left.
+    alpha: (N,) in [0, 1] at the points; alpha_at: a function that returns it at places on the hair mesh. Raises
+    `HairError` if no strand is left.
     """
     is_shown, starts = alpha >= _OPAQUE, strands.starts[:-1]
     place = np.arange(len(alpha)) - np.repeat(starts, strands.counts)
     last = np.maximum.reduceat(np.where(is_shown, place, -1), starts)
     parts = np.add.reduceat(is_shown.astype(np.float64), starts) / strands.counts
     last[parts < _LEAST_SHOWN] = -1
-    found = strands.some(place <= np.repeat(last, strands.counts))
+    is_cut = (last >= 0) & (last < strands.counts - 1)
+    cut = _cut(strands, (starts + last)[is_cut], alpha_at, mesh)
+    found = cut.some(place <= np.repeat(last + is_cut, strands.counts))
     if not len(found.counts):
         raise HairError("The texture of the hair mesh is transparent at all strands: turn off Use Alpha.")
     return found
+
+
+def _cut(strands, rows, alpha_at, mesh):
+    """Return strands whose points after those of `rows` (M,) are moved back to where the texture ends.
+
+    Between two points, the plane of the first one's triangle and its UV coordinates are continued.
+    """
+    first, second = (strands.points[at].astype(np.float64) for at in (rows, rows + 1))
+    triangle = strands.places.triangle[rows]
+    corners = mesh.vertices.astype(np.float64)[mesh.triangles[triangle]]
+    axes = corners[:, 1:] - corners[:, :1]
+    low, high = np.zeros(len(rows)), np.ones(len(rows))
+    barycentric = strands.places.barycentric[rows].astype(np.float64)
+    across = np.einsum("mki,mji->mkj", axes, axes)
+    shares = np.einsum("mki,mi->mk", axes, second - first)
+    steps = np.einsum("mkj,mj->mk", np.linalg.pinv(across, hermitian=True), shares)
+    steps = np.concatenate([-steps.sum(axis=1, keepdims=True), steps], axis=1)
+    for _halving in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        places = SurfacePoints(triangle, (barycentric + middle[:, None] * steps).astype(np.float32))
+        is_opaque = alpha_at(places) >= _OPAQUE
+        low, high = np.where(is_opaque, middle, low), np.where(is_opaque, high, middle)
+    points, radii = strands.points.copy(), strands.radii.copy()
+    triangles, weights = strands.places.triangle.copy(), strands.places.barycentric.copy()
+    # At least a little way, so that no segment has no length.
+    low = np.maximum(low, 0.5**_HALVINGS)
+    points[rows + 1] = first + low[:, None] * (second - first)
+    radii[rows + 1] = strands.radii[rows] + low * (strands.radii[rows + 1] - strands.radii[rows])
+    triangles[rows + 1], weights[rows + 1] = triangle, strands.places.barycentric[rows]  # of an opaque place
+    return replace(strands, points=points, radii=radii, places=SurfacePoints(triangles, weights))
 
 
 def on_surface(strands: MeshStrands, surface: TriMesh) -> MeshStrands:

@@ -243,16 +243,24 @@ def test_strands_begin_on_a_surface_with_normals_inward():
 
 
 def test_strands_end_where_the_texture_ends():
-    """A strand ends at its last opaque point; strands without opaque points are left out."""
-    found = made(card(3)[0], strand_count=10)
+    """Strands end where the texture does, also between two points; strands without opaque points are left out."""
+    mesh = card(3)[0]
+    found = made(mesh, strand_count=10)
     points = np.stack(strands_of(found))
-    alpha = (points[..., 2] < 0.2).astype(float)
+    end = 0.5 * (points[0, 4, 2] + points[0, 5, 2])
+
+    def alpha_at(places):
+        heights = np.einsum("nc,nc->n", mesh.vertices[mesh.triangles[places.triangle], 2], places.barycentric)
+        return (heights < end).astype(float)
+
+    alpha = alpha_at(found.places).reshape(10, -1)
     alpha[3:5] = 0.0
-    ended = mesh_strands.shown(found, alpha.ravel())
+    ended = mesh_strands.shown(found, alpha.ravel(), alpha_at, mesh)
     assert len(ended.counts) == 8
-    assert ended.points[:, 2].max() < 0.2 and ended.points[ended.starts[1:] - 1, 2].min() > 0.12
+    step = points[0, 5, 2] - points[0, 4, 2]
+    np.testing.assert_allclose(ended.points[ended.starts[1:] - 1, 2], end, atol=0.15 * step)
     with pytest.raises(HairError, match="transparent"):
-        mesh_strands.shown(found, np.zeros(len(found.points)))
+        mesh_strands.shown(found, np.zeros(len(found.points)), alpha_at, mesh)
 
 
 def test_cards_share_strands_by_their_area():
