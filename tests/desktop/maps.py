@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map of a number of a style in a window: added by a click on its button, painted, changed by a ramp, undone, redone.
+"""Maps in a window: of a number of a style, added by a click on its button, painted, changed by a ramp, undone, redone;
+and of the color, added by a click and painted on its image.
 
 Run by a desktop Blender as steps.py says. Strands are compared with those of hair without a map whose style has the
 value at From or To.
@@ -39,15 +40,21 @@ BUTTON = (48, 47)
 
 references = {}  # {value: (S, P, 3)} of hair without a map
 
+RED, GREEN = (0.8, 0.02, 0.02), (0.1, 0.4, 0.1)
+is_of_color = False  # whether the panel has the button of the color alone
+
 
 class OnlyPanel(bpy.types.Panel):
-    """The rows of the panel Root to Tip of the style, alone in a tab of the sidebar."""
+    """The rows of the panel Root to Tip of the style, or the button of the color, alone in a tab of the sidebar."""
 
     bl_label, bl_idname = "Rows", "TEST_PT_rows"
     bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "Rows"
 
     def draw(self, _context):
-        """Draw the rows of the first style."""
+        """Draw the rows of the first style, or the button of the color."""
+        if is_of_color:
+            addon().ui.map_rows.button(self.layout, of_kind("HAIR").data.vellus, "look.color")
+            return
         addon().ui.setting_rows.profile_rows(addon().ui.panels.tab.split(self.layout), style())
 
 
@@ -55,8 +62,15 @@ def style():
     return of_kind("HAIR").data.vellus.styles[0]
 
 
-def item():
-    return next((one for one in of_kind("HAIR").data.vellus.maps if one.setting == SETTING), None)
+def item(setting=SETTING):
+    return next((one for one in of_kind("HAIR").data.vellus.maps if one.setting == setting), None)
+
+
+def looks():
+    """Return the absorption (S, 3) at roots as it is drawn, and as it is stored in the hair's Curves."""
+    hair, maps = of_kind("HAIR").data, addon().data.maps.strand_maps
+    stored = addon().data.strands.attributes.read(hair, maps.ROOT, "FLOAT_VECTOR", "CURVE")
+    return maps.read_looks(hair).root.copy(), stored
 
 
 def strands():
@@ -206,5 +220,39 @@ def interpolate_again():
     facts["status"] = of_kind("HAIR").data.vellus.status
 
 
+def paint_a_coat():
+    """Click the button of the color, and paint red on its new image with a stroke of the mouse; undo and redo."""
+    global is_of_color
+    look = of_kind("HAIR").data.vellus.appearance
+    look.parametrization, look.color, look.random_color, is_of_color = "COLOR", GREEN, 0.0, True
+    sidebar().tag_redraw()
+    yield from wait(0.5)
+    panel = sidebar()
+    yield from click(panel.x + panel.width - BUTTON[0], panel.y + panel.height - BUTTON[1])
+    yield from wait_for(lambda: item("look.color") is not None, 10.0)
+    yield from key("ESC")
+    with in_viewport():
+        bpy.ops.vellus.paint_map("EXEC_DEFAULT", True, setting="look.color")
+    yield from wait(1.0)
+    facts["coat mode"] = bpy.context.mode
+    before, _stored = looks()
+    settings = bpy.context.tool_settings.image_paint
+    unified = settings.unified_paint_settings
+    unified.size, unified.use_unified_color, unified.use_unified_strength = 70, False, False
+    settings.brush.color, settings.brush.strength = RED, 1.0
+    middle = places(np.zeros((1, 3)))[0]
+    yield from drag(middle - np.array([40, 0]), middle + np.array([40, 0]), steps=6)
+    yield from wait(1.0)
+    painted, stored = looks()
+    take_picture(OUT / "coat.png")
+    facts["red"] = int(((painted[:, 0] < before[:, 0]) & (painted[:, 1] > before[:, 1])).sum())
+    facts["green"] = int((painted == before).all(axis=1).sum())
+    facts["is stored"] = bool(np.array_equal(painted, stored))
+    for name, wanted, is_redo in (("undone", before, False), ("redone", painted, True)):
+        yield from key("Z", ctrl=True, shift=is_redo)
+        yield from wait(1.0)
+        facts[f"coat {name}"] = all(np.array_equal(found, wanted) for found in looks())
+
+
 if __name__ == "__main__":
-    take((groom, press_the_button, paint, change_the_ramp, interpolate_again), pause=0.02)
+    take((groom, press_the_button, paint, change_the_ramp, interpolate_again, paint_a_coat), pause=0.02)

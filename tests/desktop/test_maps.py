@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A map of a number of a style is added by its button in a window, painted, changed by a ramp, undone and redone."""
+"""Maps of a style's number and of the color are added by their buttons in a window, painted, undone and redone."""
 
 import pytest
 
@@ -42,6 +42,14 @@ def test_a_ramp_turns_the_values_around_and_is_undone(walk):
     assert facts["same with a ramp"] < 1e-6 and facts["ramps"] == 1
     assert facts["turned"] == [facts["painted"]["white"], facts["painted"]["black"]]
     assert facts["is without a ramp"] and facts["ramp undone"] == 0.0
+
+
+def test_a_coat_is_painted_on_an_image(walk):
+    """Strands under the stroke are red, others stay green, in the picture and in the hair's Curves; undo and redo."""
+    facts = walk.facts
+    assert facts["coat mode"] == "PAINT_TEXTURE"
+    assert facts["red"] > 20 and facts["green"] > 100
+    assert facts["is stored"] and facts["coat undone"] and facts["coat redone"]
 
 
 def test_strands_are_generated_again_by_the_redo_panel(walk):

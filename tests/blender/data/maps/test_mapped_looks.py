@@ -217,7 +217,9 @@ def picture():
 MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy")]
 
 
-@pytest.mark.parametrize(("model", "mode"), MODELS)
+@pytest.mark.parametrize(
+    ("model", "mode"), [MODELS[1], *(pytest.param(*each, marks=pytest.mark.long) for each in MODELS[:1])]
+)
 def test_a_constant_map_draws_the_constant(lit, model, mode):
     """Hair with a map of one color is drawn as hair of this color, within 1.5/255; without the map, bit for bit."""
     state = lit.data.vellus
