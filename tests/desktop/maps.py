@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps in a window: of a number of a style, added by a click on its button, painted, changed by a ramp, undone, redone;
-and of the color, added by a click and painted on its image.
+and of the color, painted on its image.
 
 Run by a desktop Blender as steps.py says. Strands are compared with those of hair without a map whose style has the
 value at From or To.
@@ -41,20 +41,16 @@ BUTTON = (48, 47)
 references = {}  # {value: (S, P, 3)} of hair without a map
 
 RED, GREEN = (0.8, 0.02, 0.02), (0.1, 0.4, 0.1)
-is_of_color = False  # whether the panel has the button of the color alone
 
 
 class OnlyPanel(bpy.types.Panel):
-    """The rows of the panel Root to Tip of the style, or the button of the color, alone in a tab of the sidebar."""
+    """The rows of the panel Root to Tip of the style, alone in a tab of the sidebar."""
 
     bl_label, bl_idname = "Rows", "TEST_PT_rows"
     bl_space_type, bl_region_type, bl_category = "VIEW_3D", "UI", "Rows"
 
     def draw(self, _context):
-        """Draw the rows of the first style, or the button of the color."""
-        if is_of_color:
-            addon().ui.map_rows.button(self.layout, of_kind("HAIR").data.vellus, "look.color")
-            return
+        """Draw the rows of the first style."""
         addon().ui.setting_rows.profile_rows(addon().ui.panels.tab.split(self.layout), style())
 
 
@@ -86,6 +82,10 @@ def weights():
     group = surface.vertex_groups[item().source].index
     of_vertices = addon().data.scene.weights_in_group(surface.data, group)
     return of_vertices[bound.surface.mesh.triangles[bound.binding.roots.triangle]]
+
+
+def are_looks(wanted):
+    return all(np.array_equal(found, wanted) for found in looks())
 
 
 def note(name):
@@ -221,17 +221,11 @@ def interpolate_again():
 
 
 def paint_a_coat():
-    """Click the button of the color, and paint red on its new image with a stroke of the mouse; undo and redo."""
-    global is_of_color
+    """Paint red on the new image of a map of the color, with a stroke of the mouse; undo and redo."""
     look = of_kind("HAIR").data.vellus.appearance
-    look.parametrization, look.color, look.random_color, is_of_color = "COLOR", GREEN, 0.0, True
-    sidebar().tag_redraw()
-    yield from wait(0.5)
-    panel = sidebar()
-    yield from click(panel.x + panel.width - BUTTON[0], panel.y + panel.height - BUTTON[1])
-    yield from wait_for(lambda: item("look.color") is not None, 10.0)
-    yield from key("ESC")
+    look.parametrization, look.color, look.random_color = "COLOR", GREEN, 0.0
     with in_viewport():
+        bpy.ops.vellus.edit_map("EXEC_DEFAULT", True, setting="look.color")
         bpy.ops.vellus.paint_map("EXEC_DEFAULT", True, setting="look.color")
     yield from wait(1.0)
     facts["coat mode"] = bpy.context.mode
@@ -242,7 +236,8 @@ def paint_a_coat():
     settings.brush.color, settings.brush.strength = RED, 1.0
     middle = places(np.zeros((1, 3)))[0]
     yield from drag(middle - np.array([40, 0]), middle + np.array([40, 0]), steps=6)
-    yield from wait(1.0)
+    yield from wait(0.5)
+    yield from wait_for(lambda: np.array_equal(*looks()), 10.0)  # written after a pause
     painted, stored = looks()
     take_picture(OUT / "coat.png")
     facts["red"] = int(((painted[:, 0] < before[:, 0]) & (painted[:, 1] > before[:, 1])).sum())
@@ -250,8 +245,8 @@ def paint_a_coat():
     facts["is stored"] = bool(np.array_equal(painted, stored))
     for name, wanted, is_redo in (("undone", before, False), ("redone", painted, True)):
         yield from key("Z", ctrl=True, shift=is_redo)
-        yield from wait(1.0)
-        facts[f"coat {name}"] = all(np.array_equal(found, wanted) for found in looks())
+        yield from wait_for(lambda wanted=wanted: are_looks(wanted), 10.0)
+        facts[f"coat {name}"] = are_looks(wanted)
 
 
 if __name__ == "__main__":

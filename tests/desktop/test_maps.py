@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps of a style's number and of the color are added by their buttons in a window, painted, undone and redone."""
+"""A map of a style's number is added by its button in a window, painted and undone; one of the color is painted too."""
 
 import pytest
 
