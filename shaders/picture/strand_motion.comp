@@ -2,6 +2,7 @@
 // Motion vectors of strands.
 
 #include "picture/motion.glsl"
+#include "picture/object_motion.glsl"
 #include "visibility/strand_hit.glsl"
 
 // Index of a strand among combed strands, counted from one; 0: not combed.
@@ -35,9 +36,9 @@ vec4 sample_value()
   else {
     before = place_between(strands_before, first, point, t);
   }
-  return moved(motion.now_to_clip * vec4(now, 1.0),
-               motion.before_to_clip * vec4(before, 1.0),
-               motion.after_to_clip * vec4(after, 1.0),
+  return moved(now_to_clip() * vec4(now, 1.0),
+               before_to_clip() * vec4(before, 1.0),
+               after_to_clip() * vec4(after, 1.0),
                motion.size.xy);
 }
 

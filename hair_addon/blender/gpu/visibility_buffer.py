@@ -287,13 +287,24 @@ class VisibilityBuffer:
         """Return the texture of `surfaces_of_part`."""
         return self._part(texture_format, background)[1]
 
-    def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None):
+    def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None, joined=None):
         """Return the texture of `surfaces_of_part`, filled by a program where the last added hair is nearest.
 
-        inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's.
+        inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's; joined: a
+        function of the indices of linked hair that returns (program, *inputs) for all of it, or None.
         """
         texture = self._parts[texture_format, _NOTHING][1]
         for placed in self._hair:
+            together = None if placed.objects is None or joined is None else joined(placed.indices)
+            if together is not None:
+                program_of_all, records, textures = together
+                program_of_all.bind()
+                blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
+                textures = textures | self._declare_objects(placed, program_of_all)
+                self._fill(
+                    placed, program_of_all, texture, {"shared_view": placed.view, **blocks}, textures, placed.window
+                )
+                continue
             own = {} if placed.layers is None else dict.fromkeys(scene_programs.VISIBILITY_SAMPLERS, white())
             for index, view, window in placed.each():
                 records, textures = ({}, {}) if inputs is None else inputs[index]
@@ -446,11 +457,16 @@ class VisibilityBuffer:
                 record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
                 view = uniforms.uniform_buffer(record)
             if objects is not None:
-                textures["objects"] = objects.texture
-                program.uniform_int("object_count", objects.count)
-                program.uniform_int("last_segment", objects.last_segment)
+                textures |= self._declare_objects(placed, program)
             blocks = {"view" if objects is None else "shared_view": view, **shading.blocks}
             self._fill(placed, program, picture, blocks, textures, placed.window)
+
+    @staticmethod
+    def _declare_objects(placed, program):
+        """Give a bound program the linked objects of a `_Placed`; returns {sampler: texture}."""
+        program.uniform_int("object_count", placed.objects.count)
+        program.uniform_int("last_segment", placed.objects.last_segment)
+        return {"objects": placed.objects.texture}
 
     def _fill(self, placed, program, picture, blocks, textures, window):
         """Run a program on the samples of a window in which a hair is nearest."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..gpu import drawing
+from ...core.imaging.texture_sides import avoid_powers_of_two
+from ..gpu import drawing, driver_textures
 from ..gpu.programs import picture_programs, uniforms
 
 
@@ -112,7 +113,29 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
             with drawing.bound(picture_programs.surface_motion_program(), blocks, samplers):
                 surface.corners.triangles.draw(picture_programs.surface_motion_program())
     inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
-    return buffer.part_by(picture_programs.strand_motion_program(), picture_programs.MOTION_FORMAT, inputs)
+    program = picture_programs.strand_motion_program()
+    return buffer.part_by(program, picture_programs.MOTION_FORMAT, inputs, lambda indices: _joined(inputs, indices))
+
+
+def _joined(inputs, indices):
+    """Return (program, {instance: record}, {sampler: texture}) for linked hair objects together; None if they have
+    moved in different ways.
+
+    inputs: ({"motion": record}, {sampler: texture}) of each hair; indices: (N,) of the objects.
+    """
+    records, textures = zip(*[inputs[index] for index in indices.tolist()], strict=True)
+    records = np.array([record["motion"] for record in records])
+    kinds = {
+        (*map(id, own.values()), int(row)) for own, row in zip(textures, records["moved_row_strands"], strict=True)
+    }
+    if len(kinds) > 1:
+        return None
+    texels = np.zeros((int(avoid_powers_of_two(len(records))), 12, 4), np.float32)
+    for place, name in enumerate(("before_to_clip", "now_to_clip", "after_to_clip")):
+        texels[: len(records), 4 * place : 4 * place + 4] = records[name]
+    moved = driver_textures.new_texture((12, len(texels)), "RGBA32F", texels)
+    program = picture_programs.strand_motion_program(is_batch=True)
+    return program, {"motion": records[0]}, {**textures[0], "object_motions": moved}
 
 
 def places(drawn, world_to_view, view_to_clip):

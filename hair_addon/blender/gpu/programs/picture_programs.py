@@ -57,13 +57,22 @@ MOTION_FORMAT = "RGBA32F"  # of motion vectors
 
 
 @shaders.cached
-def strand_motion_program():
-    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp."""
-    names = ("strands_before", "strands_after", "moved_rows", "moved_points")
+def strand_motion_program(is_batch=False):
+    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp; is_batch: of linked hair
+    objects, with the sampler of picture/batch_motion.glsl.
+    """
+    names = (
+        "strands_before",
+        "strands_after",
+        "moved_rows",
+        "moved_points",
+        *(("object_motions",) if is_batch else ()),
+    )
     samplers = tuple((name, "FLOAT_2D") for name in names)
-    info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
+    info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT, is_batch=is_batch)
     info.uniform_buf(2, "Motion", "motion")
-    return shaders.compile_compute(info, "picture/strand_motion.comp")
+    replaced = {"picture/object_motion.glsl": "picture/batch_motion.glsl"} if is_batch else {}
+    return scene_programs.compile_samples(info, "picture/strand_motion.comp", replaced, is_batch)
 
 
 @shaders.cached

@@ -157,10 +157,11 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), 
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     for name in (*constants, "walked_part"):
         info.push_constant("INT", name)
-    return _compile(info, file, replaced, is_batch)
+    return compile_samples(info, file, replaced, is_batch)
 
 
-def _compile(info, file, replaced, is_batch):
+def compile_samples(info, file, replaced, is_batch):
+    """Return the compute program of a file about strands; is_batch: of linked hair objects."""
     if not is_batch:
         return compile_compute(info, file, replaced)
     return compile_compute(info, file, replaced | _BATCH_REPLACED, first=_BATCH_FIRST)
@@ -219,7 +220,7 @@ def shading_program(
         replaced["fibre/single_look.glsl"] = "fibre/mixed_looks.glsl"
         info.push_constant("VEC2", "wetness_range")
         info.push_constant("INT", "is_wet")
-    return _compile(info, file, replaced, is_batch)
+    return compile_samples(info, file, replaced, is_batch)
 
 
 def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False, is_batch=False):

@@ -10,7 +10,7 @@ from mathutils import Matrix
 
 from hair_addon.blender.data.pictures import drawn_meshes, viewport_shading
 from hair_addon.blender.gpu import ambient_visibility, shadows, solid_shading, strand_batches, surface_textures
-from hair_addon.blender.render import drawn_scene, light_paths
+from hair_addon.blender.render import drawn_scene, light_paths, motion_vectors
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
 from hair_addon.blender.render.viewport.outline import HairOutline, OutlineStyle
 from hair_addon.core.imaging import ambient_cube
@@ -244,3 +244,37 @@ def test_calls_of_a_frame_do_not_grow_with_the_number_of_heads(thin, monkeypatch
             bpy.data.objects.remove(one.parent)
             bpy.data.objects.remove(one)
     assert found[0] == found[1] and min(found[0]) > 3
+
+
+def test_motion_of_linked_heads_is_found_together(thin, monkeypatch):
+    """Heads that move apart have the motion vectors of heads one by one, with as many calls for 4 as for 2."""
+    monkeypatch.setattr(picture_detail, "_MOST_PER_SIDE", 2)
+    linked = link(thin, PLACES[:4])
+    found, draws = [], []
+    for count, is_single in ((4, False), (4, True), (2, False)):
+        for hair in linked[count:]:
+            hair.hide_viewport = hair.hide_render = True
+        for place, hair in zip(PLACES, linked, strict=False):
+            hair.parent.matrix_world = place
+        bpy.context.view_layer.update()
+        before = read()
+        for index, hair in enumerate(linked):
+            hair.parent.matrix_world = Matrix.Translation((0.1 * index, 0.0, 0.2)) @ hair.parent.matrix_world
+        bpy.context.view_layer.update()
+        after, picture = read(), hair_picture.HairPicture(SIZE, 2)
+        picture.add_pass(after, WORLD_TO_VIEW, VIEW_TO_CLIP)
+        camera = WORLD_TO_VIEW, VIEW_TO_CLIP
+        now = motion_vectors.places(after, *camera)
+        motion = motion_vectors.Motion(motion_vectors.places(before, *camera), now, now, SIZE)
+        arguments = after, motion, picture._view, picture._pass, False
+        with monkeypatch.context() as patch:
+            if is_single:
+                patch.setattr(motion_vectors, "_joined", lambda *_given: None)
+            motion_vectors.draw(*arguments)
+            with Calls() as calls:
+                vectors = motion_vectors.draw(*arguments)
+        found.append(np.array(vectors.read(), np.float32))
+        draws.append(calls.draws)
+    np.testing.assert_array_equal(found[0], found[1])
+    assert draws[0] == draws[2] < draws[1]
+    assert np.abs(found[0]).max() > 0.5
