@@ -12,9 +12,11 @@ from ..render import hair_cache, modified_hair
 from ..render.viewport import viewport
 
 
-def scene_changed(is_hair_only=False):
-    """Anything was changed, hidden or shown: views and panels read scenes again; is_hair_only: only hair changed."""
-    viewport.invalidate(is_hair_only=is_hair_only)
+def scene_changed(is_hair_only=False, is_light_only=False):
+    """Anything was changed, hidden or shown: views and panels read scenes again; is_hair_only: only hair changed;
+    is_light_only: only lamps changed.
+    """
+    viewport.invalidate(is_hair_only, is_light_only)
     if not is_hair_only:
         unread_nodes.sentence_cache.clear()
 

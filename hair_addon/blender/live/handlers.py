@@ -58,7 +58,7 @@ def after_depsgraph_update(scene, depsgraph):
     global _is_opening, _is_undone
     file_changes.follow([scene])
     is_seen = viewport.is_up_to_date()
-    events.scene_changed(is_hair_only=_is_hair_only(reports))
+    events.scene_changed(_is_hair_only(reports), _is_light_only(reports))
     if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
@@ -162,6 +162,19 @@ def _is_hair_only(reports):
     """Whether only the geometry of Curves has changed, and not surfaces, lights or the world."""
     # Blender reports no datablock for changes of visibility.
     return len(reports) > 0 and all(map(_are_curves, reports))
+
+
+def _is_light_only(reports):
+    """Whether only lamps, and places of lamps, have changed."""
+    # Blender reports the nodes of a lamp's, material's or world's own with their owner.
+    owners = [report for report in reports if not _is_own_tree(report)]
+    return len(owners) > 0 and all(
+        report.is_of(bpy.types.Light) or _type_of_object(report) == "LIGHT" for report in owners
+    )
+
+
+def _is_own_tree(report):
+    return report.is_of(bpy.types.NodeTree) and (report.datablock is None or report.datablock.is_embedded_data)
 
 
 def _is_hair_only_in_frame(reports):

@@ -28,6 +28,7 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture
 from hair_addon.blender.settings import preferences
 from tests.benchmarks.edit_guides import Editing
@@ -143,7 +144,9 @@ def measure(editing, view, lamp):
     def move_light():
         lamp.location.x += 0.01
         bpy.context.view_layer.update()
-        view.draw(editing.read())
+        depsgraph, maps = bpy.context.evaluated_depsgraph_get(), drawn.shadow_maps
+        lit = drawn_scene.relit(drawn, bpy.context.scene, bpy.context.view_layer, depsgraph, drawn.light, maps)
+        view.draw(lit)
 
     moved = median_of(move_light, CHANGES)
     editing.frame = view

@@ -9,6 +9,7 @@ from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import ambient_visibility
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import viewport
+from tests.support.pictures.viewports import context_of, view3d
 from tests.support.reading import points, write_points
 
 
@@ -18,7 +19,7 @@ def forgotten(hair, monkeypatch):
     bpy.ops.object.light_add(type="SUN")
     bpy.context.view_layer.update()
     reported = []
-    monkeypatch.setattr(viewport, "invalidate", lambda is_hair_only=False: reported.append(is_hair_only))
+    monkeypatch.setattr(viewport, "invalidate", lambda is_hair_only=False, *_others: reported.append(is_hair_only))
     return reported
 
 
@@ -108,3 +109,55 @@ def test_a_stroke_reads_no_surfaces_and_draws_coarse_shadows(lit, monkeypatch):
         np.testing.assert_array_equal(texture.read(), afresh.shadow_maps.samplers[name].read())
     for name, texture in whole.hair_visibility[0].items():
         np.testing.assert_array_equal(texture.read(), afresh.hair_visibility[0][name].read())
+
+
+def shown(is_rendered):
+    """Return the `DrawnScene` of a viewport, in Material Preview or in our own Rendered shading, with the lamps."""
+    space = view3d()
+    bpy.context.scene.render.engine = "VELLUS"
+    space.shading.type = "RENDERED" if is_rendered else "MATERIAL"
+    space.shading.use_scene_lights = space.shading.use_scene_world = True
+    return viewport.drawn_scene_of(context_of(space))
+
+
+LAMP_CHANGES = {
+    "moves": lambda: setattr(bpy.data.objects["Sun"], "rotation_euler", (1.0, 0.4, 0.2)),
+    "is brighter": lambda: setattr(bpy.data.lights["Sun"], "energy", 7.0),
+    "is hidden": lambda: setattr(bpy.data.objects["Sun"], "hide_viewport", True),
+    "is another": lambda: setattr(bpy.data.lights["Sun"], "type", "POINT"),
+}
+
+
+@pytest.mark.parametrize("is_rendered", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_lamps_that_change_leave_hair_and_surfaces_as_they_were(lit, monkeypatch, is_rendered):
+    """After changes of lamps no mesh is read and no visibility measured; lights and maps are those of a whole reading.
+
+    Then a surface that moves is read again.
+    """
+    bpy.ops.object.light_add(type="SUN")
+    bpy.context.view_layer.update()
+    shown(is_rendered)
+    calls = []
+    for owner, name in ((ambient_visibility, "measure"), (drawn_meshes, "read_drawn_meshes")):
+        real = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda *given, real=real, **named: calls.append(1) or real(*given, **named))
+    for change in ("moves", "is brighter", "is another"):
+        LAMP_CHANGES[change]()
+        bpy.context.view_layer.update()
+        relit = shown(is_rendered)
+        assert not calls, change
+        maps = {name: np.array(texture.read()) for name, texture in relit.shadow_maps.samplers.items()}
+        viewport.invalidate()
+        whole = shown(is_rendered)
+        assert calls
+        calls.clear()
+        assert relit.lights.tobytes() == whole.lights.tobytes()
+        for name, texture in whole.shadow_maps.samplers.items():
+            np.testing.assert_array_equal(maps[name], np.array(texture.read()))
+    lit.data.surface.location.x += 0.1
+    LAMP_CHANGES["moves"]()
+    bpy.context.view_layer.update()
+    LAMP_CHANGES["is hidden"]()
+    bpy.context.view_layer.update()
+    shown(is_rendered)
+    assert calls

@@ -43,6 +43,7 @@ class _View:
     lit: dict = field(default_factory=dict)  # pointer of a region → `drawn` in the light of the region's view
     wanted: dict = field(default_factory=dict)  # the same → the light of its last redraw
     outdated: drawn_scene.DrawnScene | None = None  # the previous scene, if only hair has changed
+    unlit: drawn_scene.DrawnScene | None = None  # the previous scene, if only lamps have changed
     former: drawn_scene.DrawnScene | None = None  # the previous scene
     is_playing: bool = False  # whether it was read during playback, or while a surface was being moved
 
@@ -67,11 +68,14 @@ def is_up_to_date():
     return any(view.drawn is not None for view in view_cache.values())
 
 
-def invalidate(is_hair_only=False):
-    """Read the scene again with the next redraw, as something has changed; is_hair_only: only hair has changed."""
+def invalidate(is_hair_only=False, is_light_only=False):
+    """Read the scene again with the next redraw, as something has changed; is_hair_only: only hair has changed;
+    is_light_only: only lamps have changed.
+    """
     for view in view_cache.values():
         view.former = view.drawn or view.former
         view.outdated = (view.drawn or view.outdated) if is_hair_only else None
+        view.unlit = (view.drawn or view.unlit) if is_light_only else None
         view.drawn = None
         view.lit.clear()
 
@@ -188,6 +192,10 @@ def drawn_scene_of(context):
     if view.drawn is None:
         before, view.outdated = view.outdated, None
         former, view.former = view.former, None
+        unlit, view.unlit = view.unlit, None
+        if unlit is not None and unlit.hair and view.is_playing == is_playing:
+            view.drawn = _relit(context, unlit)
+            return _lit(view, context, shading.light)
         view.is_playing = is_playing
         view.drawn = drawn_scene.read(
             context.scene,
@@ -204,6 +212,12 @@ def drawn_scene_of(context):
         if view.drawn.hair:
             hair_cache.choose_makers()
     return _lit(view, context, shading.light)
+
+
+def _relit(context, drawn):
+    """Return a `DrawnScene` of the context's viewport after only lamps have changed: hair and surfaces stay."""
+    depsgraph, maps = context.evaluated_depsgraph_get(), drawn.shadow_maps
+    return drawn_scene.relit(drawn, context.scene, context.view_layer, depsgraph, drawn.light, maps, is_ours(context))
 
 
 def _lit(view, context, light):
