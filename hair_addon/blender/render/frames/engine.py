@@ -183,7 +183,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             return Frame(size, window, *settings)
         if self.use_spherical_stereo(camera):
             raise HairError("Vellus cannot render spherical stereo: turn off Spherical Stereo of the camera.")
-        if settings[-1] is not None:
+        *_others, labels, _step_count = settings
+        if labels is not None:
             raise HairError(
                 "Panoramic cameras have no mattes: turn off the passes Cryptomatte, Object Index and Material Index."
             )
