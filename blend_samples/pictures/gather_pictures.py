@@ -68,7 +68,7 @@ def main(out=OUT, size=(WIDTH, HEIGHT), only=None):
 
 def grow(skull):
     """Long hair of smooth strands on a head."""
-    guides, hair = head.grow(skull, guide_count=700, strand_count=24_000)
+    guides, hair = head.grow(skull, guide_count=2000, strand_count=24_000)
     guides.data.vellus.guides.length = LENGTH
     api.change_guides(guides, "LENGTH", method="SET", length=LENGTH)
     api.set_styles(hair.data, [api.Frizz(amplitude=0.0004, wavelength=0.06, stray=0.03, stray_gain=12.0)])

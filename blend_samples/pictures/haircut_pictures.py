@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """docs/manual/haircuts.jpg and haircuts_cycles.jpg: haircuts that tests/desktop/haircuts makes in Blender's window.
 
-    python blend_samples/pictures/haircut_pictures.py [NAME …] [--cycles] [--drawn-only]
+    python blend_samples/pictures/haircut_pictures.py [NAME …] [--cycles] [--drawn-only] [--bare FOLDER]
 
 Each haircut leaves out/haircuts/NAME.blend and NAME.png, of which the sheet is made; --cycles writes NAME_cycles.png
 instead, and the sheet that compares them. out/haircuts/facts.json has the number of clicks, fields, views and strokes
@@ -32,7 +32,7 @@ from tools import build_extension, compile_kernels, desktop_blender
 ROOT = Path(__file__).resolve().parents[2]
 OUT = ROOT / "out" / "haircuts"
 FACTS = OUT / "facts.json"
-BARE, BARE_CAT = OUT / "bare.blend", OUT / "bare_cat.blend"
+BARE, BARE_CAT = "bare.blend", "bare_cat.blend"
 SHEET, COMPARED = (ROOT / "docs" / "manual" / f"{name}.jpg" for name in ("haircuts", "haircuts_cycles"))
 WIDTH, HEIGHT = 250, 290  # pixels of a picture
 COLUMNS = 3
@@ -62,13 +62,17 @@ def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(HAIRCUTS)}, all by default")
     parser.add_argument("--cycles", action="store_true", help="draw by Cycles")
+    parser.add_argument("--bare", type=Path, help="only write the head and the cat without hair to a folder")
     parser.add_argument("--drawn-only", action="store_true", help="draw the files that an earlier call left")
     given = parser.parse_args(arguments)
     hair_addon.register()
     gpu.init()
+    if given.bare is not None:
+        save_bare(given.bare)
+        return
     names = given.names or list(HAIRCUTS)
     if not given.drawn_only:
-        save_bare()
+        save_bare(OUT)
         for name in names:
             cut(name)
     for name in names:
@@ -79,18 +83,18 @@ def main(arguments):
         write_sheet(SHEET, [(name, name.title()) for name in HAIRCUTS if (OUT / f"{name}.png").exists()])
 
 
-def save_bare():
-    """Write the head and the cat without hair, with camera and lights, as an artist finds them."""
-    OUT.mkdir(parents=True, exist_ok=True)
+def save_bare(folder):
+    """Write the head and the cat without hair to a folder, with camera and lights, as an artist finds them."""
+    folder.mkdir(parents=True, exist_ok=True)
     skull = head.build()
     portrait.dress(skull, portrait.AHEAD)
     head.light()
     bpy.context.view_layer.objects.active = skull
-    bpy.ops.wm.save_as_mainfile(filepath=str(BARE))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / BARE))
     animal = cat.build()
     head.light()
     bpy.context.view_layer.objects.active = animal
-    bpy.ops.wm.save_as_mainfile(filepath=str(BARE_CAT))
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / BARE_CAT))
 
 
 def cut(name):
@@ -100,7 +104,7 @@ def cut(name):
     shutil.rmtree(profile, ignore_errors=True)  # it may contain an older version of the extension
     profile.mkdir(parents=True)
     script = ROOT / "tests" / "desktop" / "haircuts" / "in_window.py"
-    words = [name, extension, OUT, BARE_CAT if name == "cat" else BARE, SHOWN, STRANDS]
+    words = [name, extension, OUT, OUT / (BARE_CAT if name == "cat" else BARE), SHOWN, STRANDS]
     blender = desktop_blender.find_or_install()
     before = _done_count(name)
     status = blender.run(script, words, profile=profile, log=log, limit=900, size=WINDOW_SIZE)

@@ -96,26 +96,47 @@ WAVY = (
     press("vellus.apply_preset", preset="BROWN"),
 )
 
+# From the crown: forward to the brows, over the temples, and down at the sides and the back.
+FROM_CROWN = (
+    ((0.0, -0.004, 0.853), (0.0, -0.08, 0.848), (0.0, -0.142, 0.80)),
+    *both_sides(
+        ((0.004, -0.008, 0.853), (0.020, -0.085, 0.845), (0.026, -0.140, 0.80)),
+        ((0.014, -0.022, 0.852), (0.037, -0.085, 0.838), (0.048, -0.126, 0.797)),
+        ((0.022, -0.012, 0.85), (0.058, -0.07, 0.825), (0.072, -0.105, 0.775), (0.074, -0.10, 0.75)),
+        ((0.006, 0.0, 0.853), (0.06, -0.03, 0.825), (0.085, -0.04, 0.77)),
+    ),
+)
+BEHIND_CROWN = (
+    ((0.0, 0.004, 0.85), (0.0, 0.05, 0.81), (0.0, 0.062, 0.76)),
+    *both_sides(((0.006, 0.004, 0.85), (0.05, 0.035, 0.80), (0.062, 0.04, 0.75))),
+)
+
+
+# Around the fringe.
+SECTION = both_sides(((0.012, -0.012, 0.853), (0.042, -0.08, 0.836), (0.058, -0.12, 0.788)))
+
+
+def trimmed(**plane):
+    """A cut of the selected head's guides by a plane, which is deleted afterward."""
+    return (
+        press("mesh.primitive_plane_add", **plane),
+        select("Head"),
+        press("vellus.trim_guides", cutter="Plane"),
+        select("Plane"),
+        press("object.delete", confirm=False),
+    )
+
+
 BOB = (
     *grown(0.24, drape=False),
-    view(*ABOVE),
-    lines("vellus.draw_parting", MIDDLE),
     view(*FRONT),
-    lines(
-        "vellus.draw_flow",
-        *both_sides(
-            ((0.006, -0.142, 0.80), (0.045, -0.130, 0.80), (0.075, -0.10, 0.77), (0.088, -0.075, 0.73)),
-            ((0.006, -0.07, 0.85), (0.055, -0.06, 0.83), (0.082, -0.045, 0.78)),
-            ((0.006, 0.0, 0.85), (0.05, 0.01, 0.82), (0.068, 0.03, 0.77)),
-        ),
-    ),
+    lines("vellus.draw_parting", *SECTION),
+    lines("vellus.draw_flow", *FROM_CROWN),
+    view(*BACK),
+    lines("vellus.draw_flow", *BEHIND_CROWN),
     fields("guides", drape=True),
-    *OFF_THE_FACE,
-    press("mesh.primitive_plane_add", size=0.6, location=(0.0, 0.0, 0.655)),
-    select("Head"),
-    press("vellus.trim_guides", cutter="Plane"),
-    select("Plane"),
-    press("object.delete", confirm=False),
+    *trimmed(size=0.13, location=(0.0, -0.19, 0.752)),  # the fringe
+    *trimmed(size=0.6, location=(0.0, 0.0, 0.655)),
     select("Hair"),
     style("SLEEK"),
     press("vellus.apply_preset", preset="DARK_BROWN"),
@@ -196,7 +217,7 @@ BUN = (
 )
 
 BRAIDS = (
-    *grown(0.40, drape=False, length_variation=0.0, guide_count=700),
+    *grown(0.36, drape=False, length_variation=0.0, guide_count=2000),
     view(*ABOVE),
     lines("vellus.draw_parting", MIDDLE, ((0.0, 0.03, 0.83), (0.0, 0.055, 0.80))),
     view(*BACK),
@@ -211,7 +232,7 @@ BRAIDS = (
         is_mirrored=True,
     ),
     select("Head"),
-    press("vellus.gather_guides", line="Ties", shape="BRAID"),
+    press("vellus.gather_guides", line="Ties", shape="BRAID", tail_radius=0.014),
     press("vellus.apply_preset", preset="AUBURN"),
 )
 
@@ -230,7 +251,7 @@ TO_CROWN = [row(aside, 0.55 * aside**2 - 1.1, 0.75) for aside in ASIDE]  # from 
 TO_NAPE = [row(aside, 0.75, 2.25) for aside in ASIDE]
 
 CORNROWS = (
-    *grown(0.26, drape=False, length_variation=0.0, guide_count=1000),
+    *grown(0.26, drape=False, length_variation=0.0, guide_count=2000),
     view(0.0, -0.1, 1.0),
     lines("vellus.draw_tie", *TO_CROWN, use_stroke_endpoints=False),
     view(*BACK),

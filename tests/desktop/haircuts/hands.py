@@ -262,6 +262,27 @@ def mirrored(is_mirrored=True):
     return act
 
 
+def remeshed(voxel):
+    """Close the holes of the head, because Voxel Remesh makes two walls of a mesh with holes, and remesh it.
+
+    voxel: size of its faces [m].
+    """
+
+    def act():
+        head = bpy.data.objects["Head"].data
+        head.remesh_voxel_size, head.use_remesh_preserve_attributes = voxel, True
+        count.fields += 2
+        yield from select("Head")()
+        yield from press("object.mode_set", mode="EDIT")()
+        yield from press("mesh.select_all", action="SELECT")()
+        yield from press("mesh.fill_holes", sides=0)()
+        yield from press("object.mode_set", mode="OBJECT")()
+        yield from press("object.voxel_remesh")()
+        yield from window.wait(1.0)
+
+    return act
+
+
 def settled():
     """Yield to Blender until hair and guides have followed."""
     yield from window.wait(0.3)

@@ -2,22 +2,35 @@
 """A haircut in a window, by the steps of haircuts.py; run by a desktop Blender as steps.py says.
 
 PART is the name of the haircut, MORE the file of the head, the number of strands that the window shows, and that of the
-file PART.blend that is left in OUT.
+files PART.blend and PART_remeshed.blend, with another mesh of the head and twice the guides, that are left in OUT.
 """
 
 import sys
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.haircuts import hands  # noqa: E402
+from tests.desktop.haircuts.comparison import distances  # noqa: E402
 from tests.desktop.haircuts.haircuts import HAIRCUTS  # noqa: E402
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
-from tests.desktop.window import in_viewport, install, refine_to, take_picture, viewport, wait  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    curve_points,
+    in_viewport,
+    install,
+    refine_to,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
 
 HEAD, SHOWN, KEPT = MORE[0], int(MORE[1]), int(MORE[2])
+VOXEL = 0.005  # [m]
+COMPARED = 4000  # strands before and after
 
 
 def open_head():
@@ -44,13 +57,62 @@ def cut():
 
 def save():
     take_picture(OUT / f"{PART}_window.png")
-    if hands.hair() is not None:
-        facts[PART]["status"] = [hands.hair().data.vellus.status, hands.guides().data.vellus.status]
-        hands.hair().data.vellus.hair.strand_count, hands.hair().data.vellus.is_drawn = KEPT, True
-        yield from wait(2.0)
-    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / f"{PART}.blend"))
+    strands = yield from _strands()
+    facts[PART]["before the eyes"] = float(_is_before_eyes(strands).mean())
+    yield from _save(PART)
+
+
+def _save(name):
+    facts[PART]["status"] = [hands.hair().data.vellus.status, hands.guides().data.vellus.status]
+    hands.hair().data.vellus.hair.strand_count, hands.hair().data.vellus.is_drawn = KEPT, True
+    yield from wait(2.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / f"{name}.blend"))
+    hands.hair().data.vellus.is_drawn = False
     yield
 
 
+def _strands():
+    """Return (COMPARED, P, 3) points, without styles: locks are in other places if strands are."""
+    hair = hands.hair().data
+    hair.vellus.hair.strand_count = COMPARED
+    for item in hair.vellus.styles:
+        getattr(item, item.kind.lower()).is_on = False
+    yield from wait_for(lambda: len(hair.curves) == COMPARED, 30.0)
+    yield from wait(1.0)
+    found = curve_points(hands.hair()).reshape(COMPARED, -1, 3).astype(np.float64)
+    for item in hair.vellus.styles:
+        getattr(item, item.kind.lower()).is_on = True
+    return found
+
+
+def _is_before_eyes(strands):
+    """Return (S,) whether strands hang before the eyes of the sample's head, from its lids to its chin."""
+    x, y, z = np.moveaxis(strands, 2, 0)
+    return ((abs(x) < 0.05) & (y < -0.11) & (z < 0.736) & (z > 0.62)).any(axis=1)
+
+
+def remesh():
+    """Remesh the head and double the guides; note how far strands are from those before, and from their neighbors."""
+    before = yield from _strands()
+    yield from hands.select("Hair Guides")()
+    if not len(hands.guides().data.vellus.layers):
+        yield from hands.press("vellus.add_layer")()
+    yield from hands.remeshed(VOXEL)()
+    yield from hands.select("Hair Guides")()
+    count = 2 * len(hands.guides().data.curves)
+    yield from hands.fields("guides", guide_count=count)()
+    yield from wait_for(lambda: len(hands.guides().data.curves) == count, 60.0)
+    yield from wait(1.0)
+    after = yield from _strands()
+    apart, neighbors = distances(after, before), distances(before, before, nearest=2)
+    facts[PART]["remeshed"] = {
+        "guides": len(hands.guides().data.curves),
+        "within 5 %": float((apart < 0.05).mean()),
+        "median": float(np.median(apart)),
+        "neighbors within 5 %": float((neighbors < 0.05).mean()),
+    }
+    yield from _save(f"{PART}_remeshed")
+
+
 if __name__ == "__main__":
-    take((open_head, cut, save), pause=0.02)
+    take((open_head, cut, save, remesh), pause=0.02)

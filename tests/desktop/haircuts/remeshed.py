@@ -9,11 +9,11 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils.kdtree import KDTree
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.haircuts import hands  # noqa: E402
+from tests.desktop.haircuts.comparison import distances  # noqa: E402
 from tests.desktop.haircuts.haircuts import AWAY_FROM_PARTING, FRONT, SIDE, grown  # noqa: E402
 from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
@@ -53,17 +53,6 @@ def guides():
     return curve_points(hands.guides()).reshape(len(hands.guides().data.curves), -1, 3)
 
 
-def distances(found, others):
-    """Return (G,) mean distances between guides and the others with the nearest roots, relative to their lengths."""
-    tree = KDTree(len(others))
-    for number, guide in enumerate(others):
-        tree.insert(guide[0], number)
-    tree.balance()
-    nearest = others[[tree.find(guide[0])[1] for guide in found]]
-    apart = np.linalg.norm((found - found[:, :1]) - (nearest - nearest[:, :1]), axis=2).mean(axis=1)
-    return apart / np.linalg.norm(np.diff(found, axis=1), axis=2).sum(axis=1)
-
-
 def comb():
     install(ZIP)
     refine_to(1)
@@ -79,18 +68,8 @@ def comb():
     combed = guides()
     facts["combed"] = np.sort(distances(combed, grown_guides)).tolist()
     take_picture(OUT / "combed.png")
-    bpy.context.view_layer.objects.active = bpy.data.objects["Head"]
-    bpy.data.objects["Head"].data.remesh_voxel_size = VOXEL
-    bpy.data.objects["Head"].data.use_remesh_preserve_attributes = True
     before = len(bpy.data.objects["Head"].data.vertices)
-    yield from hands.select("Head")()
-    # Voxel Remesh makes two walls of a mesh with holes.
-    yield from hands.press("object.mode_set", mode="EDIT")()
-    yield from hands.press("mesh.select_all", action="SELECT")()
-    yield from hands.press("mesh.fill_holes", sides=0)()
-    yield from hands.press("object.mode_set", mode="OBJECT")()
-    yield from hands.press("object.voxel_remesh")()
-    yield from wait(1.0)
+    yield from hands.remeshed(VOXEL)()
     facts["vertices"] = [before, len(bpy.data.objects["Head"].data.vertices)]
     facts["groups"] = [group.name for group in bpy.data.objects["Head"].vertex_groups]
     yield from hands.select("Hair Guides")()
