@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A haircut that is combed in a layer stays when the head is remeshed and the guides are doubled."""
+"""Haircuts in a window stay when the head is remeshed and the guides are doubled."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from tests.desktop import walks
+from tools import build_extension
+
+HAIRCUTS = "wavy", "bob", "fade", "bun", "ponytail", "braids", "cornrows", "beard", "cat"
+DRAPED = "wavy", "bob"
+PICTURES = build_extension.ROOT / "blend_samples" / "pictures" / "haircut_pictures.py"
 
 pytestmark = [pytest.mark.desktop, pytest.mark.long]
 
@@ -24,3 +32,41 @@ def test_combing_stays_on_another_mesh_with_twice_the_guides(walk):
         np.median(facts[name]) for name in ("from combed", "from uncombed", "between neighbors")
     )
     assert combed < 0.85 * uncombed and combed < 1.2 * neighbors
+
+
+@pytest.fixture(scope="module")
+def bare():
+    """Return a function that returns the file of the head of a haircut, in a folder that the desktop Blender sees."""
+    folder = build_extension.ROOT / "out" / "desktop" / "heads"
+    subprocess.run([sys.executable, PICTURES, "--bare", folder], check=True)
+    return lambda name: folder / ("bare_cat.blend" if name == "cat" else "bare.blend")
+
+
+@pytest.mark.parametrize("name", HAIRCUTS)
+def test_haircuts_stay_on_another_mesh_with_twice_the_guides(name, bare, desktop, extension, new_profile):
+    """Strands without styles are as near to the strands before as these are to their neighbors.
+
+    Hair that drapes again on the other mesh is nearer to the strands before than a twelfth of its length.
+    """
+    walk = walks.take(
+        desktop,
+        "haircuts/in_window",
+        extension,
+        new_profile(),
+        "opengl",
+        parts=(name,),
+        more=(bare(name), 300, 4000),
+        folder=f"haircut_{name}",
+        size=(560, 440),
+        limit=900,
+    )
+    walk.assert_done()
+    facts = walk.facts[name]
+    assert facts["status"] == ["", ""]
+    after = facts["remeshed"]
+    if name in DRAPED:
+        assert after["median"] < 0.08
+    else:
+        assert after["within 5 %"] > after["neighbors within 5 %"] - 0.05
+    if name == "bob":
+        assert facts["before the eyes"] < 0.01
