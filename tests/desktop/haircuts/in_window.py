@@ -64,24 +64,30 @@ def save():
 
 def _save(name):
     facts[PART]["status"] = [hands.hair().data.vellus.status, hands.guides().data.vellus.status]
-    hands.hair().data.vellus.hair.strand_count, hands.hair().data.vellus.is_drawn = KEPT, True
-    yield from wait(2.0)
+    hands.hair().data.vellus.is_drawn = True
+    yield from _count_changed(KEPT)
     bpy.ops.wm.save_as_mainfile(filepath=str(OUT / f"{name}.blend"))
     hands.hair().data.vellus.is_drawn = False
-    yield
+    yield from _count_changed(SHOWN)
+
+
+def _count_changed(count):
+    """Change the number of strands, and yield to Blender until they are there: other changes before are then too."""
+    hands.hair().data.vellus.hair.strand_count = count
+    yield from wait_for(lambda: len(hands.hair().data.curves) == count, 90.0)
+    yield from wait(0.3)
 
 
 def _strands():
     """Return (COMPARED, P, 3) points, without styles: locks are in other places if strands are."""
     hair = hands.hair().data
-    hair.vellus.hair.strand_count = COMPARED
     for item in hair.vellus.styles:
         getattr(item, item.kind.lower()).is_on = False
-    yield from wait_for(lambda: len(hair.curves) == COMPARED, 30.0)
-    yield from wait(1.0)
+    yield from _count_changed(COMPARED)
     found = curve_points(hands.hair()).reshape(COMPARED, -1, 3).astype(np.float64)
     for item in hair.vellus.styles:
         getattr(item, item.kind.lower()).is_on = True
+    yield from _count_changed(SHOWN)
     return found
 
 
