@@ -1,7 +1,7 @@
 # make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare turntable dynamics pictures test farm long desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable dynamics pictures test farm long desktop viewers bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # Let uv use the system's certificates, as pip does: some networks have their own.
@@ -39,6 +39,12 @@ long: $(installed) ## in an hour: the rest of the parameters of which `make test
 # Three processes, as walks wait for a quarter of their time.
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
 	$(python) -m pytest -m "desktop and not long" --numprocesses 3 --dist loadfile --no-loadscope-reorder tests/desktop $(ARGS)
+
+viewers: $(installed) ## files of cards in Khronos' validator and in three.js: needs Node.js and Chromium; pictures in out/viewers
+	mkdir -p build/viewers out/viewers
+	cp tests/support/viewers/package.json tests/support/viewers/package-lock.json build/viewers
+	npm ci --prefix build/viewers --ignore-scripts --no-audit --no-fund
+	VELLUS_VIEWERS=build/viewers VELLUS_VIEWERS_PICTURES=out/viewers $(python) -m pytest -m farm tests/crossings/test_viewers.py $(ARGS)
 
 bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rendering of a light by Cycles, as a panorama of the light that it sends in all directions."""
 
+import math
 import os
 from pathlib import Path
 
@@ -13,8 +14,9 @@ from ...data.pictures import light_panoramas, shader_sockets, unsaved_images
 from ...host import scene_time
 from . import world_panorama
 
-SAMPLES = 4  # per pixel
+SAMPLES = 2  # per pixel
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
+_MARGIN = 0.02  # of the latitudes
 _ENERGY = 1e6  # of the light, for pixels of about one
 
 # Settings of a light that Vellus reads beside its nodes, by which Cycles would multiply the panorama.
@@ -54,6 +56,10 @@ def render(path, name, matrix, frame, is_coarse, out):
     size = light_panoramas.COARSE_SIZE if is_coarse else light_panoramas.SIZE
     world_panorama.set_up(scene, SAMPLES, size)
     scene.cycles.max_bounces = 0
+    # Below are the directions in which the light shines. Others stay black.
+    scene.render.use_border, scene.render.use_crop_to_border = True, False
+    scene.render.border_min_x, scene.render.border_max_x = 0.0, 1.0
+    scene.render.border_min_y, scene.render.border_max_y = 0.0, _lit_part(light)
     scene_time.go_to_time(scene, frame)
     part = Path(out).with_suffix(".part.exr")
     lit = world_panorama.picture(scene, part)
@@ -64,6 +70,12 @@ def render(path, name, matrix, frame, is_coarse, out):
     np.savez(part.with_suffix(".npz"), lit=lit, plain=plain.mean(axis=-1))
     part.unlink()
     os.replace(part.with_suffix(".npz"), out)
+
+
+def _lit_part(light):
+    """Return the part of all latitudes, from below, that a light can reach."""
+    half = {"SPOT": 0.5 * getattr(light, "spot_size", 0.0), "AREA": 0.5 * math.pi}.get(light.type, math.pi)
+    return min(half / math.pi + _MARGIN, 1.0)
 
 
 def _add_sphere(radius, center):
