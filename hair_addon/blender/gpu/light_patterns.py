@@ -7,7 +7,7 @@ from ..data.pictures.light_panoramas import SIZE
 from ..host.caches import Cache
 from . import driver_textures
 
-texture_cache = Cache(capacity=2)  # (identities of panoramas) → (panoramas, texture)
+texture_cache = Cache(capacity=4)  # (identities of panoramas) → (panoramas, texture)
 
 
 def write(light, panorama, matrix, factor, layer):

@@ -12,7 +12,8 @@ from ...host.caches import Cache
 from . import kept_files, picture_jobs, unread_nodes, world_digest, world_panoramas
 from .shader_sockets import nodes_of
 
-SIZE = 1024, 512  # pixels of patterns
+SIZE = 1024, 512  # pixels of patterns, and of panoramas of spots
+WIDE_SIZE = 512, 256  # pixels of panoramas of other lights
 COARSE_SIZE = 64, 32  # pixels of the first panorama in viewports
 _TINY = 1e-4  # light without nodes, relative to the brightest direction, below which nodes are not seen
 _LEAST = 1e-3  # factor of a lamp's power, relative to its brightest direction
@@ -92,7 +93,7 @@ def find(light, matrix, frame, waits):
     is_placed = any(node.type in _WORLD_NODES for node in nodes_of(light.node_tree))
     rows = (matrix if is_placed else np.eye(4)).tolist()
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
-    found.update(repr((SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
+    found.update(repr((SIZE, WIDE_SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
     made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
     path = made or picture_jobs.last_of(light)

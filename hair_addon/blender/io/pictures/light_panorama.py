@@ -53,8 +53,8 @@ def render(path, name, matrix, frame, is_coarse, out):
     camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
     size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
     camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
-    size = light_panoramas.COARSE_SIZE if is_coarse else light_panoramas.SIZE
-    world_panorama.set_up(scene, SAMPLES, size)
+    pixels = light_panoramas.SIZE if light.type == "SPOT" else light_panoramas.WIDE_SIZE
+    world_panorama.set_up(scene, SAMPLES, light_panoramas.COARSE_SIZE if is_coarse else pixels)
     scene.cycles.max_bounces = 0
     # Below are the directions in which the light shines. Others stay black.
     scene.render.use_border, scene.render.use_crop_to_border = True, False
