@@ -102,7 +102,9 @@ def box_of_changed_parts(
     """
     height, width, channels = shape
     words = np.flatnonzero(before.ravel().view(np.uint64) != now.ravel().view(np.uint64))
-    changed = np.unique(words // (_LANES // 2))  # faster than a reduction along short rows
+    is_changed = np.zeros(len(now), bool)
+    is_changed[words // (_LANES // 2)] = True  # faster than a reduction along short rows
+    changed = np.flatnonzero(is_changed)
     if not len(changed):
         return None
     in_row = width * channels
