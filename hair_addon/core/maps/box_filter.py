@@ -17,6 +17,7 @@ from . import uv_islands
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
+_LEAST_STRANDS = 16_384  # fewer are not worth a thread
 _TAPS = 4  # texels along each side that a strand's share touches at the level where its side is at most 3 texels
 
 
@@ -162,7 +163,8 @@ def _means(taps, levels):
         )
     )
     rows = [parallel.Rows(cells), parallel.Rows(weights)]
-    parallel.launch(_weigh, len(taps.texels), inputs=[sources, *rows], outputs=[found], device="cpu")
+    options = {"device": "cpu", "least_rows": _LEAST_STRANDS}
+    parallel.launch(_weigh, len(taps.texels), inputs=[sources, *rows], outputs=[found], **options)
     return found.numpy()
 
 
