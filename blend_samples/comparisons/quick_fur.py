@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair as *Add Hair* grows it beside Blender's *Quick Fur*, both untouched, in Blender's initial scene.
+"""Unchanged hair of *Add Hair* beside Blender's *Quick Fur*, in Blender's initial scene.
 
 .venv/bin/python blend_samples/comparisons/quick_fur.py
 
@@ -68,7 +68,7 @@ def build(model):
 
 
 def unwrap(model):
-    """Add a UV map, without which Quick Fur grows nothing."""
+    """Add a UV map, which Quick Fur requires."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.objects.active = model
     bpy.ops.object.mode_set(mode="EDIT")
@@ -78,7 +78,7 @@ def unwrap(model):
 
 
 def look_at(model, margin):
-    """Place the camera and the initial lamp as far from a model as they are from the cube, in its size."""
+    """Place the camera and the lamp at the same distances as from the cube, relative to the size of the model."""
     corners = [model.matrix_world @ Vector(corner) for corner in model.bound_box]
     middle = 0.125 * sum(corners, Vector())
     radius = max((corner - middle).length for corner in corners)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of cards have no errors for Khronos' validator, and three.js with three-vrm swings their hair."""
+"""Khronos' validator finds no errors in files of cards, and three.js with three-vrm swings their hair."""
 
 import os
 import shutil

@@ -32,7 +32,7 @@ def are_read(hair):
 
 
 def changed(datablock):
-    """Drop what is known of a reported material or node tree; of all, if it is None or belongs to no material."""
+    """Drop the value of a reported material or node tree, or all values if it is None or belongs to no material."""
     if datablock is not None and datablock.is_embedded_data:
         datablock = next((m for m in bpy.data.materials if m.node_tree == datablock), None)
     if datablock is None:

@@ -69,8 +69,8 @@ def _steps(strands, to_world, limits, view):
 
 
 def points_within(strands, to_world, view, bend):
-    """Return (N,) fewest evenly chosen points with which `StrandsOnGPU` at (N, 4, 4) places deviate by at most `bend`
-    [samples] from their curves in a view.
+    """Return (N,) minimum numbers of evenly chosen points with which `StrandsOnGPU` at (N, 4, 4) places deviate by at
+    most `bend` [samples] from their curves in a view.
     """
     samples_per_unit, _diameters = _sizes_in(view, strands, to_world)
     lengths = strands.mean_length * samples_per_unit * drawing.scales_of(to_world)
@@ -78,8 +78,8 @@ def points_within(strands, to_world, view, bend):
 
 
 def _points_that_show(strands, lengths, bend, least):
-    """Return (N,) fewest evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by at most `bend`
-    [samples] from their curves; lengths: (N,) of strands [samples].
+    """Return (N,) minimum numbers of evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by at
+    most `bend` [samples] from their curves; lengths: (N,) of strands [samples].
 
     Returns all points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is
     longer than the chord by the fraction 8/3 (s / c)².

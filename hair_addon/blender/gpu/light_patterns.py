@@ -13,8 +13,8 @@ texture_cache = Cache(capacity=4)  # (identities of panoramas) → (panoramas, t
 def write(light, panorama, matrix, factor, layer):
     """Write the pattern of a lamp into its `uniforms.LIGHT` record.
 
-    matrix: (4, 4) of the lamp; factor: RGB of the pattern that the lamp's power contains; layer: of the
-    texture.
+    matrix: (4, 4) of the lamp; factor: RGB mean of the pattern, which the lamp's power contains; layer: index of
+    the panorama in the texture.
     """
     light["pattern"][:3, :3] = panorama.axes(matrix)
     light["pattern"][3, :3] = 1.0 / np.maximum(factor, 1e-20)
@@ -22,7 +22,7 @@ def write(light, panorama, matrix, factor, layer):
 
 
 def texture_of(panoramas):
-    """Return the texture of panoramas, one in each layer; a texel without panoramas. Raises `HairError`."""
+    """Return the texture of panoramas, one in each layer; one texel if there are none. Raises `HairError`."""
     keys = tuple(map(id, panoramas))  # the cache holds the panoramas, so their identities are not reused
     return texture_cache.get(keys, lambda: (panoramas, _new(panoramas)))[1]
 
@@ -39,7 +39,7 @@ def _new(panoramas):
 
 
 def of_paths(panoramas):
-    """Return patterns (L, H, W, 3) of panoramas for `media.Surroundings`, half as fine as the texture; None without."""
+    """Return patterns (L, H, W, 3) of panoramas for `media.Surroundings`, at half the resolution; None without any."""
     if not panoramas:
         return None
     width, height = SIZE

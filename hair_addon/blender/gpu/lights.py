@@ -33,9 +33,9 @@ NO_LIGHTS = np.zeros(0, uniforms.LIGHT.dtype), [], []  # the result of `read_lig
 def read_lights(depsgraph, for_render, places=()):
     """Return ((N,) `uniforms.LIGHT` records of all visible lights, or of all rendered lights; (N,) links; patterns).
 
-    The links are from `light_linking.read_links`, the patterns are `Panorama`s of lights by their layer. Lights with
-    non-finite values are skipped with a message. places: (P, 3) of hair, for lights whose nodes Cycles renders. Raises
-    `HairError` if it cannot, for a render.
+    The links are from `light_linking.read_links`; patterns: the `Panorama` of each layer. Lights with non-finite values
+    are skipped with a message. places: (P, 3) of hair, for lights whose nodes Cycles renders. Raises `HairError` if
+    Cycles cannot render nodes for a render.
     """
     time = scene_time.time_of(depsgraph.scene_eval)
     lights, links, patterns = [], [], []

@@ -24,8 +24,8 @@ _SHADE_DISTANCE = 0.15
 _LEAST_WIDE = 1e-4  # minimum radius [m] of a wide map
 _ALL = drawing.Steps()
 
-# Strands at rest are drawn with fewer points if they deviate from their curves by at most this distance [texels]:
-# chords are on the inner side of curved hair, so outer strands would be in front of all shadows.
+# Maximum distance [texels] from their curves of strands at rest that are drawn with fewer points. Chords lie on the
+# inner side of curved hair, so with longer chords the outer strands would lie in front of all shadows.
 _GREATEST_BEND = 0.1
 
 # While hair moves, the sphere that maps are aimed at stays until hair does not fit, and is then enlarged by the first

@@ -132,7 +132,7 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
 
 
 def with_points(strands, points):
-    """`StrandsOnGPU` with other points (S, P, 3) float32 of as many strands; only these are uploaded."""
+    """`StrandsOnGPU` with other points (S, P, 3) float32 of the same strands; only the points are uploaded."""
     return replace(
         strands,
         texture=packed_texture(points, strands.row_strands),
@@ -147,7 +147,7 @@ def with_points(strands, points):
 
 
 def _some(strand_count):
-    """A sample of the strands, which is enough for the level of detail."""
+    """Slice of a sample of the strands, which suffices for the level of detail."""
     return slice(None, None, -(-strand_count // 1000))
 
 

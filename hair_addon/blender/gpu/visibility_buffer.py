@@ -291,7 +291,7 @@ class VisibilityBuffer:
         """Return the texture of `surfaces_of_part`, filled by a program where the last added hair is nearest.
 
         inputs: for each hair ({instance: record}, {sampler: texture}) of the program besides the scene's; joined: a
-        function of the indices of linked hair that returns (program, *inputs) for all of it, or None.
+        function that returns (program, *inputs) for all linked hair with these indices, or None.
         """
         texture = self._parts[texture_format, _NOTHING][1]
         for placed in self._hair:

@@ -80,7 +80,8 @@ def making_cards(hair, settings, folder=None):
 def _drawing(strands, comparison, of_trials, level, settings, parts):
     """Draw a level, as work in steps.
 
-    comparison, of_trials: with the strands, None for no error or no trials; parts: (first, last) of the total progress.
+    comparison, of_trials: comparisons with the strands for the error and for trials, or None; parts: the first and last
+    part of the total progress.
     """
     first, last = parts
     middle = first + 0.1 * (last - first)

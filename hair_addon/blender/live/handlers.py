@@ -165,8 +165,8 @@ def _is_hair_only(reports):
 
 
 def _is_light_only(reports):
-    """Whether only lamps, and places of lamps, have changed."""
-    # Blender reports the nodes of a lamp's, material's or world's own with their owner.
+    """Whether only lamps and their places have changed."""
+    # Blender reports an embedded node tree together with the lamp, material or world that owns it.
     owners = [report for report in reports if not _is_own_tree(report)]
     return len(owners) > 0 and all(
         report.is_of(bpy.types.Light) or _type_of_object(report) == "LIGHT" for report in owners

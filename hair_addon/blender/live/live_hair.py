@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live hair: updates while guides are combed and masks are painted.
 
-In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and so are looks by maps
-that are painted. The hair's Curves are written at the end of the interaction, or before they are read. Without a window
+In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and so are looks from
+painted maps. The hair's Curves are written at the end of the interaction, or before they are read. Without a window
 the Curves are written at once.
 """
 
@@ -305,7 +305,7 @@ def write_soon(hair):
 
 
 def evaluate_shading(hair):
-    """Update the look of hair; in a window, looks by maps of hair that Vellus draws are written after a pause."""
+    """Update the look of hair. In a window, looks from maps are written after a pause if Vellus draws the hair."""
     is_soon = running.has_window() and hair.vellus.is_drawn and not _is_drawn_modified(hair)
     looks.evaluate_shading(hair, is_soon)
     if strand_maps.is_pending(hair):

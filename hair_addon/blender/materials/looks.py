@@ -12,7 +12,7 @@ from . import materials
 def evaluate_shading(target, is_soon=False):
     """Update a hair's material from its settings, and its display type from *Shaded in Viewport*.
 
-    is_soon: looks by maps are stored by `strand_maps.write_pending`.
+    is_soon: `strand_maps.write_pending` stores looks from maps later.
     """
     target.vellus.is_shading_stale = False
     curves_objects.draw_natively(target, not target.vellus.is_drawn)

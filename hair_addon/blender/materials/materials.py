@@ -18,8 +18,8 @@ _OURS = "is_vellus_hair"  # the custom property of materials created by Vellus
 def write_hair_material(curves, is_soon=False):
     """Give Curves a Principled Hair material of their appearance; an artist's material is left alone.
 
-    Looks by maps are stored in the Curves; is_soon: by `strand_maps.write_pending`. Returns [`HairError`] about missing
-    sources of maps.
+    Looks from maps are stored in the Curves; is_soon: later, by `strand_maps.write_pending`. Returns [`HairError`]
+    about missing sources of maps.
 
     Linked Curves keep their materials: undo does not restore assignments to linked data, so that they would keep a
     deleted material, which crashes Blender.

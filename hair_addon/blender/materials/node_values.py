@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Values and links of shader nodes, written only if they differ: a write lets Blender evaluate the material."""
+"""Values and links of shader nodes, written only if they differ: Blender evaluates the material after each write."""
 
 import numpy as np
 
 
 def assign(owner, name, value):
-    """Set a property of numbers of a node, socket or material, unless it has the value in single precision."""
+    """Set a numeric property of a node, socket or material, unless it has this value in single precision."""
     present = getattr(owner, name)
     if np.ndim(value) == 0:
         is_same = present == np.float32(value)

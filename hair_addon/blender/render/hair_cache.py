@@ -368,7 +368,7 @@ def shading_of(datablock, strands=None, is_neutral=False, waits=True):
     `HairError`.
 
     strands: its `StrandsOnGPU`; is_neutral: of strands to be tinted, in place of the look's color; waits: whether all
-    tables are needed now, or may follow as of `late_layers`.
+    tables are needed now; otherwise `late_layers` bakes some of them later.
     """
     if is_neutral:
         return _neutral_shading_of(datablock)
@@ -389,7 +389,7 @@ def _neutral_shading_of(datablock):
 
 
 def _shading_of_look(state, look, looks=None, purpose=None):
-    """Return the `Shading` of a look; purpose: as of `late_layers.tables` if tables may follow."""
+    """Return the `Shading` of a look; purpose: for `late_layers.tables`, None if all tables are needed now."""
     variation = appearance.strand_settings(look)
     if looks is not None:
         return _shading_of_looks(state, look, look_tables.variation_of(variation), looks, purpose)

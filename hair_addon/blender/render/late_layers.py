@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of strands that differ in radial roughness, in viewports: baked in the background, not within a redraw.
+"""Tables for strands that differ in radial roughness, which viewports bake in the background.
 
-A redraw bakes the tables of one layer at most, as for hair without such a map, and shows all strands with its radial
-roughness. Once the first and the last layer are baked, strands differ by these two; at last they have all layers.
+A redraw bakes at most one layer of tables, as for hair without such a map, and draws all strands with the radial
+roughness of this layer. Viewports mix the first and the last layer as soon as both are baked, and finally all layers.
 """
 
 import os
@@ -21,14 +21,14 @@ from ...core.shading.tables.radial_tables import Layers, RadialTables
 from ..host.caches import Cache
 from ..host.notices import say
 
-_LOOK = 0.1  # [s] between checks whether tables are baked
+_LOOK = 0.1  # [s] between checks for baked tables
 _NICE = 10  # priority of the thread, if the system has priorities of threads
-_LAYERS = 17  # of the whole range of radial roughness
-_FEW = 2  # missing layers at an end of the range, without which strands differ by the others
+_LAYERS = 17  # layers of the whole range of radial roughness
+_FEW = 2  # layers that may be missing at the ends of the range while the others are shown
 _STEP = "Baking Tables"
 
 layer_cache = Cache(capacity=2 * _LAYERS)  # arguments of `look_tables.bake` → `LookTables`
-request_cache = Cache(capacity=16)  # what tables are for → `_Request`, while layers are missing
+request_cache = Cache(capacity=16)  # purpose of tables → `_Request`, while layers are missing
 
 _jobs: list["_Baking"] = []  # at most one
 
@@ -48,7 +48,7 @@ class _Baking:
 
     wanted: tuple  # arguments of all layers of a request
     missing: list
-    done: list = field(default_factory=list)  # (arguments, `LookTables`), which the thread appends to
+    done: list = field(default_factory=list)  # (arguments, `LookTables`), appended by the thread
     job: Any = None
 
     def start(self) -> None:
@@ -66,10 +66,10 @@ class _Baking:
 def tables(
     purpose: Any, settings: Any, variation: Any, covered: tuple[float, float], layers: Layers, mean: float, device: str
 ) -> tuple[LookTables | RadialTables, tuple]:
-    """Return the best present tables of strands that differ in radial roughness, and a key of these; others follow.
+    """Return the best baked tables for strands that differ in radial roughness, and their key; a thread bakes the rest.
 
-    purpose: what the tables are for; settings, variation, covered, layers, device: as of `radial_tables.bake`; mean:
-    radial roughness of the strands in the mean. Raises `HairError`.
+    purpose: key of the request; settings, variation, covered, layers, device: as for `radial_tables.bake`; mean: mean
+    radial roughness of the strands. Raises `HairError`.
     """
     wanted = tuple(
         (replace(settings, radial_roughness=radial), variation, covered, device)
@@ -88,13 +88,13 @@ def tables(
 
 
 def forget(purpose: Any) -> None:
-    """Forget a request, whose tables are present or not needed any more."""
+    """Forget a request whose tables are all baked or no longer needed."""
     if len(request_cache):
         request_cache.invalidate(purpose)
 
 
 def has_new() -> bool:
-    """Whether viewports would show other tables than those they have shown; true once for each change."""
+    """Whether newer tables are baked than viewports have shown; true once for each change."""
     _take()
     is_new = False
     for request in request_cache.values():
@@ -122,7 +122,7 @@ def _present(wanted, layers):
     layer_cache.make_room(len(wanted))
     made = [layer_cache.get(arguments) for arguments in wanted]
     most = len(wanted)
-    # Painted values exceed the range so far by a layer: strands beyond it have the nearest layer.
+    # Painted values may exceed the baked range by a layer: strands beyond the range have its nearest layer.
     runs = [(first, count) for count in range(most, max(most - _FEW, 2) - 1, -1) for first in range(most - count + 1)]
     for first, stride, some in (
         *((first, 1, made[first : first + count]) for first, count in runs),
@@ -140,7 +140,7 @@ def _missing(wanted):
 
 
 def _begin():
-    """Bake the missing layers of a request, unless a thread does; a thread for nobody ends after its layer."""
+    """Start a thread that bakes missing layers, unless one runs; a thread without a request ends after its layer."""
     wanted = [request.wanted for request in request_cache.values()]
     for baking in _jobs:
         if baking.wanted not in wanted:
@@ -156,11 +156,11 @@ def _begin():
 
 
 def _take():
-    """Take over what the thread has baked."""
+    """Store the layers that the thread has baked."""
     if not _jobs:
         return
     baking = _jobs[0]
-    is_done = baking.job.is_done  # before its layers are taken: none comes later
+    is_done = baking.job.is_done  # read before the layers are stored, so that none is missed
     while baking.done:
         layer_cache.keep(*baking.done.pop(0))
     if is_done:
@@ -175,7 +175,7 @@ def _take():
 
 
 def parts() -> tuple[int, int] | None:
-    """Return (number of baked layers, number of layers) that the thread works on; None without a thread."""
+    """Return (number of baked layers, number of layers) of the request in work; None without a thread."""
     if not _jobs:
         return None
     wanted = _jobs[0].wanted

@@ -35,23 +35,25 @@ def path_count(blender_scene, size):
 
 
 def most_paths(device, count, step_count=1):
-    """Return the maximum number of paths on a Warp device for a picture of `count` paths, one of `step_count` motion
-    steps of a frame, which share the paths that a frame may have.
+    """Return the maximum number of paths on a Warp device for a picture of `count` paths.
+
+    step_count: number of motion steps, which share the maximum of a frame.
     """
     most = _MOST_TIMES * count
     return most if device.is_cpu else max(most, min(_MOST_TIMES_ON_GPU * count, _MOST_ON_GPU // step_count))
 
 
 def most_paths_at_rest(device, count):
-    """Return the maximum number of paths on a Warp device for a viewport at rest, whose hair has `count` paths at
-    first: a GPU adds paths between redraws, however small the hair is.
+    """Return the maximum number of paths on a Warp device for a viewport at rest, which begins with `count` paths.
+
+    A GPU adds paths between redraws even if the hair is small in the picture.
     """
     return _MOST_TIMES * count if device.is_cpu else max(_MOST_TIMES * count, _MOST_ON_GPU)
 
 
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_progress, step_count=1):
     """Return a `DrawnScene` whose hair is lit by `count` paths through a grid, for a view with these (4, 4)
-    matrices. step_count: of a frame with motion blur, whose mean has less noise than a step.
+    matrices. step_count: number of motion steps; their mean has less noise than a step.
 
     Returns the scene unchanged, for dual scattering of all hair, if `count` is 0, no hair with an area is in view, no
     path starts in sight, hair is too large for its width, any light is linked, or any hair is not shaded by the

@@ -118,8 +118,8 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
 
 
 def _joined(inputs, indices):
-    """Return (program, {instance: record}, {sampler: texture}) for linked hair objects together; None if they have
-    moved in different ways.
+    """Return (program, {instance: record}, {sampler: texture}) for all linked hair objects; None if their textures
+    differ.
 
     inputs: ({"motion": record}, {sampler: texture}) of each hair; indices: (N,) of the objects.
     """

@@ -43,7 +43,7 @@ def are_same(arrays: Sequence[Any], others: Sequence[Any]) -> bool:
 
 
 def have_same_details(arrays: Sequence[Any], others: Sequence[Any]) -> bool:
-    """Whether the `arrays` of strands are equal to others but for the places of points."""
+    """Whether the `arrays` of strands are equal to others, except for the positions of points."""
     (points, *numbers, looks), (their_points, *their_numbers, their_looks) = arrays, others
     is_equal = points.shape == their_points.shape and all(map(_are_equal, numbers, their_numbers))
     return is_equal and strand_looks.are_same(looks, their_looks)

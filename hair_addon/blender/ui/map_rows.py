@@ -43,7 +43,7 @@ def draw(layout, item, hair):
     if details is not None and details.has_course:
         _course_rows(layout, item)
     elif details is not None:
-        layout.label(text="The setting belongs to whole strands: it has no curve from root to tip", icon="INFO")
+        layout.label(text="The setting has one value per strand, so it has no curve from root to tip", icon="INFO")
     if item.course_tree is None or map_items.is_set(item):
         layout.operator("vellus.remove_map", icon="X").setting = item.setting
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The choice of a placement of cards: the one with the least error of several, then exchanges of single cards."""
+"""Choice of the placement of cards with the least error, then exchanges of single cards."""
 
 from dataclasses import replace
 
@@ -14,12 +14,12 @@ from .card_settings import CardSettings, Level
 from .texels import TexelSums
 
 SAMPLES = 384  # along each side of the views of trials
-_TEXTURE_SIZE = 512  # most texels along a side of the textures of trials
+_TEXTURE_SIZE = 512  # maximum number of texels along a side of the textures of trials
 _CROSSED = (0.4, 1.0)
 _OUTWARD = (0.5, 8.0)
 _TIP = (0.5, 2.0)
-_FIRST_EXCHANGE = 6  # one card in this many is exchanged by the first trial
-MOST_EXCHANGES = 12  # trials
+_FIRST_EXCHANGE = 6  # the first trial exchanges one of this many cards
+MOST_EXCHANGES = 12  # maximum number of trials
 
 
 def best_placement(
@@ -27,7 +27,7 @@ def best_placement(
 ) -> tuple[CardSettings, Placement]:
     """Return (settings, placement) with the least error for the number of cards of a level.
 
-    comparison: with the strands, of `SAMPLES` samples. One parameter after the other is varied: the part of crossed
+    comparison: with the strands, `SAMPLES` samples wide. Parameters are varied one after the other: the part of crossed
     cards, unless the settings have one, the weight of facing outward, and the weight of tips. Then single cards are
     exchanged while the error falls. All trials have the same number of cards. Raises `HairError`.
     """

@@ -35,8 +35,9 @@ class CardError:
 
 @dataclass(frozen=True)
 class CardShares:
-    """Shares of N cards in the six views: errors (N,) of the pixels that they or their strands are seen in, and seen
-    (N,), the number of samples in which they are visible.
+    """Shares of N cards in the six views.
+
+    errors: (N,) of the pixels in which cards or their strands are visible; seen: (N,) number of visible samples.
     """
 
     errors: np.ndarray
@@ -44,7 +45,7 @@ class CardShares:
 
 
 class Comparison:
-    """Views of strands, with which cards are compared; samples: along each side of a view, a multiple of 128."""
+    """Views of strands for comparison with cards; samples: number along each side of a view, a multiple of 128."""
 
     def __init__(self, strands: CardStrands, progress: Progress = no_progress, samples: int = SAMPLES) -> None:
         self._sides = Sides(strands.points, strands.surface, samples)

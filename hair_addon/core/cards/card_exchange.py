@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exchange of cards: more cards where pictures differ from those of the strands, fewer where cards are hardly seen."""
+"""Exchange of cards: more cards where they differ from the strands, fewer where they are hardly visible."""
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from .card_layout import Clumps
 
 
 def exchanged(features: np.ndarray, clumps: Clumps, shares: CardShares, most: int) -> Clumps:
-    """Return clumps with as many cards, up to `most` of which are taken from some clumps and given to others.
+    """Return clumps with the same number of cards, after moving up to `most` cards from some clumps to others.
 
-    features: (S, D) of strands, by which clumps are similar; shares: of the cards of clumps, then of second cards. The
+    features: (S, D) of strands, to compare clumps; shares: of the first cards of clumps, then of second cards. The
     clumps with the largest error get a second card, or are divided if they have one. The least visible cards are
     removed: second cards, or cards whose clump joins the most similar one.
     """
@@ -38,7 +38,7 @@ def exchanged(features: np.ndarray, clumps: Clumps, shares: CardShares, most: in
     for clump, other in joined.items():
         labels[labels == clump] = other
     kept = np.setdiff1d(np.arange(len(second)), list(joined))
-    renamed = np.full(len(second) + 1, -1, np.int32)  # the last one is for -1
+    renamed = np.full(len(second) + 1, -1, np.int32)  # the last entry is for -1
     renamed[kept] = np.arange(len(kept))
     return Clumps(renamed[labels], np.flatnonzero(second[kept]))
 
@@ -46,7 +46,8 @@ def exchanged(features: np.ndarray, clumps: Clumps, shares: CardShares, most: in
 def _removals(middles, is_crossed, seen, seconds, takers):
     """Return ({clump: the clump that it joins}, [clumps that lose their second card]), at most one for each taker.
 
-    middles: (C, D) features of clumps; seen: of cards; seconds: (C,) index of second cards; takers: clumps that stay.
+    middles: (C, D) features of clumps; seen: visible samples of cards; seconds: (C,) index of second cards;
+    takers: clumps that stay.
     """
     joined, without_second, is_free = {}, [], np.ones(len(middles), bool)
     is_free[takers] = False

@@ -43,8 +43,8 @@ class Placement:
     """Parameters of the placement of cards; the error measure chooses among several.
 
     outward: weight of facing away from the surface, relative to following the spread of a clump; tip: weight of the
-    distances between tips in the division into clumps, relative to those between roots; clumps: in place of those of
-    `clumps_of`.
+    distances between tips in the division into clumps, relative to those between roots; clumps: replace the clumps
+    of `clumps_of`.
     """
 
     outward: float = 2.0
@@ -126,7 +126,7 @@ def clumps_of(
     placement: Placement,
     progress: Progress = no_progress,
 ) -> Clumps:
-    """Return the clumps of similar strands for the cards of a level; the thickest ones are crossed."""
+    """Return the clumps of similar strands for the cards of a level; the thickest clumps get a second card."""
     points = strands.points
     crossed, flyaways, caps = settings.parts_of(level.card_count)
     count = level.card_count - crossed - flyaways - caps
@@ -236,7 +236,7 @@ def _thickest(points, labels, axes, count):
 
 
 def _second(part, crossed):
-    """Return (strands, labels, axes, reach) of cards at a right angle to those of clumps; crossed: their indices."""
+    """Return (strands, labels, axes, reach) of second cards, at right angles to the first; crossed: their clumps."""
     strands, labels, axes, reach = part
     card = np.full(len(axes.centres), -1)
     card[crossed] = np.arange(len(crossed))

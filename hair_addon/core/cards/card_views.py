@@ -31,7 +31,7 @@ _SIDES = np.array(
 
 @dataclass(frozen=True)
 class View:
-    """A picture from one side: linear colors (n, n, 3) times coverage, and coverage (n, n), of the finest pixels.
+    """A picture from one side: linear colors (n, n, 3) times coverage, and coverage (n, n), at the finest resolution.
 
     seen: (samples, samples) index of the strand, or of the quad of cards, in each sample, or `NONE`.
     """

@@ -15,7 +15,7 @@ from .ribbon_charts import divided
 _SIDES = 24  # directions in which sections are measured
 _LEVELS = 17  # sections of a lock without rings
 _FLAT = 0.9999  # cosine between the normals of a flat cap's faces
-_CAP_HEIGHT = 0.05  # of a cap's middle above its ring, relative to the ring's radius, below which the cap is flat
+_CAP_HEIGHT = 0.05  # height of a cap's middle above its ring, relative to its radius; lower caps are flat
 _SLENDER = 1.5  # least length of hair relative to its diameter
 
 
@@ -129,7 +129,7 @@ def _rings(topology, points):
 
 
 def _without_flat_ends(points, layers):
-    """Return layers of vertices without a single vertex at an end that is in the plane of its ring."""
+    """Remove a single vertex at an end from layers of vertices, if it lies in the plane of its ring."""
     for end, beside, inner in ((0, 1, 2), (-1, -2, -3)):
         if len(layers[end]) == 1 and len(layers) > 3:
             ring = points[layers[beside]]

@@ -2,8 +2,8 @@
 """Meshes of hair cards, tubes and solid locks → strands.
 
 Strands of a card run from its root end to its tip end, spread over its width with random offsets. Strands of a tube or
-a lock are evenly distributed over its cross sections, on the spiral of [Vogel79]. If they fill a tube or a lock with
-their radii, more of them are along its rim.
+a lock are evenly distributed over its cross sections, on the spiral of [Vogel79]. Strands that fill a tube or a lock
+with their radii are denser along its rim.
 """
 
 from collections.abc import Callable
@@ -23,9 +23,9 @@ from .mesh_strand_settings import MOST_STRANDS, MeshStrandSettings
 _CLEAR = 0.1  # difference of two ends' distances to the surface, relative to the length, that determines the root
 _JITTER = 0.6  # of a strand's place, relative to the distance of strands across a card
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # [rad]
-_RIM, _INSET = 2.0, 0.8  # strands at the rim relative to the root of the number, and inset relative to their radius
+_RIM, _INSET = 2.0, 0.8  # number at the rim relative to the square root of all; inset relative to the radius
 _OPAQUE = 0.5  # alpha above which a texture shows hair
-_HALVINGS = 4  # of a segment in which a texture ends
+_HALVINGS = 4  # bisections of the segment in which a texture ends
 _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
@@ -189,7 +189,7 @@ class _Maker:
         order = np.arange(count)
         radii = sections.sizes / np.sqrt(count)
         if self._settings.fills and count > 1:
-            # As many strands along the rim as give a smooth outline, mostly inside of it with their radii.
+            # Enough strands along the rim for a smooth outline; most of their radius lies inside.
             rim = round(_RIM * np.sqrt(count))
             out, inset = np.sqrt((order + 0.5) / max(count - 0.5 * (rim + 1), 0.5)), _INSET * radii
             out[order >= count - rim] = 1.0
@@ -284,9 +284,9 @@ def shown(
 
 
 def _cut(strands, rows, alpha_at, mesh):
-    """Return strands whose points after those of `rows` (M,) are moved back to where the texture ends.
+    """Return strands with the points after `rows` (M,) moved back to the end of the texture.
 
-    Between two points, the plane of the first one's triangle and its UV coordinates are continued.
+    Between two points, the plane and the UV coordinates of the first point's triangle are extended.
     """
     first, second = (strands.points[at].astype(np.float64) for at in (rows, rows + 1))
     triangle = strands.places.triangle[rows]
@@ -305,11 +305,11 @@ def _cut(strands, rows, alpha_at, mesh):
         low, high = np.where(is_opaque, middle, low), np.where(is_opaque, high, middle)
     points, radii = strands.points.copy(), strands.radii.copy()
     triangles, weights = strands.places.triangle.copy(), strands.places.barycentric.copy()
-    # At least a little way, so that no segment has no length.
+    # A minimum distance, so that no segment has zero length.
     low = np.maximum(low, 0.5**_HALVINGS)
     points[rows + 1] = first + low[:, None] * (second - first)
     radii[rows + 1] = strands.radii[rows] + low * (strands.radii[rows + 1] - strands.radii[rows])
-    triangles[rows + 1], weights[rows + 1] = triangle, strands.places.barycentric[rows]  # of an opaque place
+    triangles[rows + 1], weights[rows + 1] = triangle, strands.places.barycentric[rows]  # an opaque place
     return replace(strands, points=points, radii=radii, places=SurfacePoints(triangles, weights))
 
 

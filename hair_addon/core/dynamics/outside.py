@@ -6,9 +6,9 @@ guides into the surface. From root to tip, each point that is inside is moved to
 following points move along and return gradually, so that strands keep their shape and almost their length. Strands that
 are outside stay bit-identical.
 
-A `Barrier` may remember where points near the surface were found outside, and how far they were from the surface: a
-point that has moved less since then is still outside, and is not searched again. Beyond a rim, a point can move behind
-the surface without crossing it, so half of the difference to the distance of the nearest rim limits the motion as well.
+A `Barrier` may remember outside places of points near the surface, and their distances from the surface: a point that
+has moved less since then is still outside, and is not searched again. Beyond a rim, a point can move behind the surface
+without crossing it, so the motion is also limited to half of the difference between its distances from rim and surface.
 """
 
 from collections.abc import Sequence
@@ -37,8 +37,8 @@ _AHEAD = wp.constant(1.0)  # additional search radius in segments, which saves l
 _FAR = wp.constant(1e6)  # [m]
 _PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # tolerance of distances [m]
-_UNKNOWN = -1e6  # for a point that was not searched yet
-_RIM_CELLS = 4  # along the longest side of the box around all rims, to divide them into boxes
+_UNKNOWN = -1e6  # for points that were not searched yet
+_RIM_CELLS = 4  # boxes of rims along the longest side of the box around all rims
 
 _NON_FINITE = "Strands to keep outside need points with finite coordinates."
 
@@ -79,7 +79,7 @@ class Barrier:
         """Return strands (S, P, 3) [m] moved out of the obstacles, with the results of `moved_outside`.
 
         held: (S,) number of points from the root that do not move, at least 1; None for the root alone; known_as: (S,)
-        different indices of strands, by which a later call knows them again: it takes less time, for the same result.
+        unique indices of strands, which identify them in later calls: these take less time for the same result.
         Raises `HairError` for non-finite points.
         """
         points = np.asarray(points, np.float64)
@@ -93,7 +93,7 @@ class Barrier:
     def moved_only(
         self, points: np.ndarray, held: np.ndarray | None = None, known_as: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return ((M, P, 3) float64 of the strands that are moved, (S,) bool: which), otherwise as `moved`."""
+        """Return ((M, P, 3) float64 points of moved strands, (S,) bool: whether each strand moved); see `moved`."""
         if not np.isfinite(points).all():
             raise HairError(_NON_FINITE)
         if self._colliders.mesh is None or not points.size:
@@ -117,7 +117,7 @@ class Barrier:
         return np.where(is_same, points[is_moved], after + self._origin), is_moved
 
     def _known_of(self, known_as, point_count):
-        """Return (G, P) vec4 of the last searches of points; empty if strands are not known again."""
+        """Return (G, P) vec4 of the last searches of points; empty without `known_as`."""
         if known_as is None:
             return wp.empty((0, 0), dtype=wp.vec4, device=self._colliders.device)
         if known_as.min(initial=0) < 0:

@@ -16,7 +16,7 @@ from .regions import Regions
 if TYPE_CHECKING:
     from .part_lines import PartLines
 
-CENTRES = 6  # searched, as the nearest may be on another face
+CENTRES = 6  # searched centers, as the nearest may be on another face
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class RootBinder:
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
         """Return (S, 2) int32: the two centers nearest to each strand, -1 if there are fewer than two.
 
-        They are in its region, on its side of part lines and, at sharp edges, on its face.
+        These centers are in the strand's region, on its side of part lines and, at sharp edges, on its face.
         """
         regions = self._with_guide_regions(strands, centres)
         found = interpolation.guide_weights.find_candidates(

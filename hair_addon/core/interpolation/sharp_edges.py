@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sharp edges and thin sheets: guides on another face are farther away than the straight path to their roots.
+"""Sharp edges and thin sheets: guides on another face count as farther away than they are.
 
 With r_j the distance from a strand's root to guide j, r' the distance to the first excluded guide, and s_j = 0 for
 normals that differ by less than `BEGIN`, rising to 1 at `END`:
 
     r_j + HOLD (r' - r_j) s_j
 
-So a strand follows guides of its own face wherever this face has guides within r'. Otherwise it would take guides of
-the other face turned by the whole edge. On smooth surfaces with few guides, normals differ by as much only near r',
-where weights are small. HOLD is below 1 because a strand whose guides are all on other faces still prefers nearer
-guides.
+So a strand follows guides of its own face wherever this face has guides within r'. Otherwise it would follow guides
+of the other face, turned by the angle of the edge. On smooth surfaces with few guides, normals differ so much only
+near r', where weights are small. HOLD is below 1 because a strand whose guides are all on other faces still prefers
+nearer guides.
 """
 
 import math

@@ -14,12 +14,12 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 MOST_SIDE = 2048  # texels along a side: larger images are averaged to limit memory
 
 _ROWS_AT_ONCE = 256
-# Fewer are not worth a thread, which takes half a millisecond to start beside many others.
+# Smaller parts are not worth a thread, which takes half a millisecond to start if many threads run.
 _LEAST_ROWS = 256
 _LEAST_PARTS = 16_384
 
 _LANES = 16  # words of a digest
-_PART = 256  # words of a part of an image with one digest
+_PART = 256  # words per digest
 _block = wp.types.vector(length=_LANES, dtype=wp.uint32)
 
 
@@ -60,8 +60,8 @@ def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | No
 def digests(pixels: np.ndarray) -> np.ndarray:
     """Return digests (N, 16) uint32 of the parts of an image (H, W, C) float32, to detect changes without a copy.
 
-    A part has 256 words, one after the other; the last part may have fewer words, which are filled with zeros. Digests
-    take half the time of a comparison with a copy, which is limited by memory.
+    A part has 256 consecutive words; the last part is filled up with zeros. Digests take half the time of a comparison
+    with a copy, which is limited by memory bandwidth.
     """
     words = np.ascontiguousarray(pixels, np.float32).view(np.uint32).ravel()
     whole_count = len(words) // _PART
@@ -99,7 +99,7 @@ def box_of_changed_parts(
 ) -> tuple[slice, slice] | None:
     """Return the slices of rows and columns of the parts of an image whose `digests` differ; None if all agree.
 
-    shape: (H, W, C) of the image. The box contains all changes, and up to a part more on both sides.
+    shape: (H, W, C) of the image. The box contains all changes, and at most one more part on each side.
     """
     height, width, channels = shape
     words = np.flatnonzero(before.ravel().view(np.uint64) != now.ravel().view(np.uint64))

@@ -3,9 +3,9 @@
 
 .venv/bin/python tests/benchmarks/viewports/large_views.py
 
-Columns: a frame while the view turns, a pass at rest, a frame after a light was moved, and one after guides were
-combed; below them the times at the start of the work on viewports, which had another camera. All lights cast shadows.
-`--small` takes few strands, pixels and frames, to try the program without a graphics card.
+Columns: a frame while the view turns, a pass at rest, a frame after a light was moved, and a frame after guides were
+combed. Rows below have earlier times, with another camera. All lights cast shadows.
+`--small` uses few strands, pixels and frames, to try the program without a GPU.
 """
 
 import argparse

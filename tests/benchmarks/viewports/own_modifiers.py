@@ -3,8 +3,8 @@
 
 .venv/bin/python tests/benchmarks/viewports/own_modifiers.py --strands 100000
 
-Blender evaluates the sample head's hair again, at rest or as its surface bends, and Vellus reads and uploads what it
-found. With a software driver uploads are processor time too.
+Blender evaluates the hair of the sample head again, at rest or on a bending surface, and Vellus reads and uploads the
+result. With a software driver uploads are processor time too.
 """
 
 import argparse
@@ -32,7 +32,7 @@ CHANGES, STARTS = 9, 2
 
 
 def add_offset(hair):
-    """Add the least of modifiers: one node, which moves all points alike."""
+    """Add a minimal modifier: one node that moves all points alike."""
     tree = bpy.data.node_groups.new("Offset", "GeometryNodeTree")
     for side in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")

@@ -212,7 +212,7 @@ def combed(rng, radius, strand_count, point_count=33):
 def lit_by_rays(points, radius, places):
     """Return (N,) bool: whether rays from places (N, 3) along Y miss all strands (S, P, 3)."""
     start, end = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
-    # Segments beside all places matter to no ray.
+    # Segments beside all places block no ray.
     low, high = places.min(axis=0) - radius, places.max(axis=0) + radius
     is_near = ((np.maximum(start, end) > low) & (np.minimum(start, end) < high))[:, [0, 2]].all(axis=1)
     start, along = start[is_near], (end - start)[is_near]

@@ -115,7 +115,7 @@ def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, stra
 
 
 def test_shares_of_cards_add_up_to_the_samples_that_are_seen(comparison, strands):
-    """Every sample with hair counts for one card, and cards beside the strands themselves have no error."""
+    """Every sample with hair counts for one card, and the total error does not depend on the shares."""
     clumps = clumps_of(strands, LEVEL, CardSettings(crossed=0.3), Placement())
     mesh, maps = best_placement._drawn(strands, LEVEL, CardSettings(), Placement(clumps=clumps))
     error, shares = comparison.shares_of(mesh, maps, LEVEL.segment_count, clumps.labels)

@@ -80,7 +80,7 @@ def test_roots_stay_and_guides_pass_the_tie(ball, shape):
 
 @pytest.mark.parametrize("shape", ["BRAID", "ROPE"])
 def test_strands_of_guides_of_any_length_stay_in_a_braid_up_to_its_tuft(ball, shape):
-    """Strands are means of their guides: means of places that are apart in a lock lie outside of the braid."""
+    """Strands are means of their guides: means of different places along a lock lie outside of the braid."""
     guides = guides_on(80)
     whole = LENGTH * np.linspace(0.9, 1.5, 80)
     guides = (guides[:, :1] + (guides - guides[:, :1]) * (whole / LENGTH)[:, None, None]).astype(np.float32)

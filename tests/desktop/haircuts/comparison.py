@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far curves are from the curves with the nearest roots."""
+"""Distances between curves and the curves with the nearest roots."""
 
 import numpy as np
 from mathutils.kdtree import KDTree

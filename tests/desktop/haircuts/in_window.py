@@ -72,14 +72,14 @@ def _save(name):
 
 
 def _count_changed(count):
-    """Change the number of strands, and yield to Blender until they are there: other changes before are then too."""
+    """Change the number of strands, and yield until this and all earlier changes are complete."""
     hands.hair().data.vellus.hair.strand_count = count
     yield from wait_for(lambda: len(hands.hair().data.curves) == count, 90.0)
     yield from wait(0.3)
 
 
 def _strands():
-    """Return (COMPARED, P, 3) points, without styles: locks are in other places if strands are."""
+    """Return (COMPARED, P, 3) points, without styles, because the places of locks depend on the strands."""
     hair = hands.hair().data
     for item in hair.vellus.styles:
         getattr(item, item.kind.lower()).is_on = False
@@ -92,13 +92,13 @@ def _strands():
 
 
 def _is_before_eyes(strands):
-    """Return (S,) whether strands hang before the eyes of the sample's head, from its lids to its chin."""
+    """Return (S,) whether strands hang in front of the eyes of the sample head, or of its face below them."""
     x, y, z = np.moveaxis(strands, 2, 0)
     return ((abs(x) < 0.05) & (y < -0.11) & (z < 0.736) & (z > 0.62)).any(axis=1)
 
 
 def remesh():
-    """Remesh the head and double the guides; note how far strands are from those before, and from their neighbors."""
+    """Remesh the head and double the guides; measure distances from former strands, and between neighbors before."""
     before = yield from _strands()
     yield from hands.select("Hair Guides")()
     if not len(hands.guides().data.vellus.layers):

@@ -44,9 +44,9 @@ def bare():
 
 @pytest.mark.parametrize("name", HAIRCUTS)
 def test_haircuts_stay_on_another_mesh_with_twice_the_guides(name, bare, desktop, extension, new_profile):
-    """Gathered strands are as near to the strands before as these are to their neighbors.
+    """Gathered strands are as close to the former strands as these are to their neighbors.
 
-    Hair that grows and drapes again on the other mesh is nearer to the strands before than an eighth of its length.
+    Hair that grows and drapes again on the other mesh stays within an eighth of its length.
     """
     walk = walks.take(
         desktop,

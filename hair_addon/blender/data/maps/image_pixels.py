@@ -23,7 +23,7 @@ pixel_cache = Cache(capacity=16)
 class _Converted:
     """`digests` of the pixels of an image (H, W, C) in Blender, and the converted pixels.
 
-    raw: the array that these pixels were read into, for the next read; way: arguments of the conversion; before: the
+    raw: the array with these pixels, used again by the next read; way: arguments of the conversion; before: the
     converted pixels before the last change; changed: the box of that change.
     """
 

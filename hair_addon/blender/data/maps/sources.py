@@ -59,7 +59,7 @@ def stored_strands(hair):
 
 
 def _known_roots(hair, surface):
-    """Return `stored_roots.points`: the known points if nothing has changed, so that painting does not check them."""
+    """Return `stored_roots.points`, cached while nothing changes, so that painting does not check roots again."""
     stored, known = stored_roots.stored(hair), root_cache.get(hair.session_uid)
     if known is not None and _has_same_faces(known[0], surface) and all(map(_are_equal, known[1], stored)):
         return known[2]
@@ -70,7 +70,7 @@ def _known_roots(hair, surface):
 
 
 def _has_same_faces(surface, other):
-    """Whether a `Surface` is another one, possibly in another pose."""
+    """Whether two `Surface`s have the same faces; their poses may differ."""
     return surface.mesh is other.mesh and surface.is_turned == other.is_turned
 
 
@@ -78,7 +78,7 @@ def _are_equal(one, two):
     return one is two or (one is not None and two is not None and np.array_equal(one, two))
 
 
-# session_uid of hair → (`Surface`, `stored_roots.stored`, `SurfacePoints`), which is compared.
+# session_uid of hair → (`Surface`, `stored_roots.stored`, `SurfacePoints`); the first two are compared.
 root_cache = Cache(capacity=4)
 
 

@@ -44,7 +44,7 @@ def has_looks(state) -> bool:
 
 
 def _maps_of_look(state):
-    """Yield the maps of settings that the look uses, except the wetness, which is an attribute of its own."""
+    """Yield the maps of settings that the look uses, except wetness, which has its own attribute."""
     for item in state.maps:
         is_of_look = item.setting.startswith("look.") and item.setting in varied_settings.all_varied()
         if not is_of_look or item.setting == shared_wetness.SETTING or not map_items.is_set(item):
@@ -134,7 +134,7 @@ pending_cache = Cache()
 def write_looks(hair, is_soon: bool = False) -> tuple[StrandLooks | None, list[HairError]]:
     """Store the looks of strands in their Curves, or remove them; returns the result of `looks_of`.
 
-    is_soon: `write_pending` stores them, as Blender takes longer to evaluate changed Curves than maps take to be read.
+    is_soon: `write_pending` stores them later, because Blender evaluates changed Curves more slowly than maps are read.
     """
     looks, errors = looks_of(hair) if len(hair.curves) else (None, [])
     pending_cache.invalidate(hair.session_uid)
@@ -151,12 +151,12 @@ def write_looks(hair, is_soon: bool = False) -> tuple[StrandLooks | None, list[H
 
 
 def is_pending(hair) -> bool:
-    """Whether hair has looks that `write_looks` has left."""
+    """Whether hair has looks that are not stored yet."""
     return pending_cache.get(hair.session_uid) is not None
 
 
 def write_pending(hair) -> None:
-    """Store the looks that `write_looks` has left, unless the hair has other strands since."""
+    """Store the looks that are not stored yet, unless the number of strands has changed."""
     looks = pending_cache.get(hair.session_uid)
     pending_cache.invalidate(hair.session_uid)
     if looks is not None and len(looks) == len(hair.curves):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of lamps whose nodes Vellus does not read: Cycles renders a panorama of it once, which is their pattern."""
+"""Light of lamps with nodes that Vellus does not read: Cycles renders a panorama once, which is cast as a pattern."""
 
 import hashlib
 import zipfile
@@ -12,12 +12,12 @@ from ...host.caches import Cache
 from . import kept_files, picture_jobs, unread_nodes, world_digest, world_panoramas
 from .shader_sockets import nodes_of
 
-SIZE = 1024, 512  # pixels of patterns, and of panoramas of spots
+SIZE = 1024, 512  # pixels of patterns, and of panoramas of spot lights
 WIDE_SIZE = 512, 256  # pixels of panoramas of other lights
 COARSE_SIZE = 64, 32  # pixels of the first panorama in viewports
-_TINY = 1e-4  # light without nodes, relative to the brightest direction, below which nodes are not seen
-_LEAST = 1e-3  # factor of a lamp's power, relative to its brightest direction
-_BRIGHTEST = 6e4  # within the range of half floats
+_TINY = 1e-4  # least light without nodes that divides, relative to the brightest direction
+_LEAST = 1e-3  # least factor of a lamp's power, relative to its brightest direction
+_BRIGHTEST = 6e4  # greatest value of a pattern, within the range of half floats
 
 picture_cache = Cache(capacity=64)  # path → `Panorama`
 
@@ -38,7 +38,7 @@ class Panorama:
 
     @cached_property
     def pattern(self):
-        """(height, width, 3) float32 of `SIZE`: light with nodes relative to that without them, in each direction."""
+        """(height, width, 3) float32 of `SIZE`: light with nodes divided by light without nodes, in each direction."""
         ratio = self.lit / np.maximum(self.plain, _TINY * self.plain.max() + 1e-30)[..., None]
         ratio = np.clip(ratio, 0.0, _BRIGHTEST).astype(np.float32)
         rows, columns = (np.arange(side) * count // side for side, count in zip(SIZE[::-1], ratio.shape, strict=False))
@@ -50,10 +50,10 @@ class Panorama:
         return matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
 
     def factor(self, matrix, places):
-        """Return RGB, the light that nodes let arrive at places (P, 3) relative to that without them, in the mean.
+        """Return the mean RGB light that arrives at places (P, 3), divided by the light without nodes.
 
-        matrix: (4, 4) of the lamp. Without places or light at these, the mean of all directions. It is positive, unless
-        a channel is dark in all directions: other places may have light.
+        matrix: (4, 4) of the lamp. Without places, or without light at places, it is the mean of all directions. It is
+        positive unless a channel is dark in all directions, because other places may have light.
         """
         return np.maximum(self._mean(matrix, places), _LEAST * self.pattern.max(axis=(0, 1)))
 

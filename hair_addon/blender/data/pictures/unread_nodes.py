@@ -10,7 +10,7 @@ _MOST = 3  # names in a sentence
 
 sentence_cache = Cache()  # session_uid of a scene → `sentences` of it
 
-_OF_LIGHTS = "Cycles renders the light of these nodes in all directions, as a pattern on hair and surfaces: {names}."
+_OF_LIGHTS = "Cycles renders the light of these nodes as a pattern on hair and surfaces: {names}."
 _OF_FALLOFFS = "Light Falloff nodes have the strength of Quadratic without Smooth, at all distances: {names}."
 _OF_MATERIALS = "Nodes of these inputs of surface shaders have no effect, only their values: {names}."
 _OF_BAKED = "Cycles bakes these nodes of surface materials: {names}."

@@ -132,7 +132,7 @@ def are_radii(values, radii):
 
 def valid_radii(radii):
     """Radii with negative and excessive values replaced by Blender's default; the same array if there are none."""
-    if radii.size and radii.min() >= 0.0 and radii.max() <= notices.LARGEST:  # in a fifth of the time; false for NaN
+    if radii.size and radii.min() >= 0.0 and radii.max() <= notices.LARGEST:  # takes a fifth of the time; false for NaN
         return radii
     return np.where((radii >= 0.0) & (radii <= notices.LARGEST), radii, np.float32(RADIUS))
 

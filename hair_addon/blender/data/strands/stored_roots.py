@@ -33,7 +33,7 @@ def stored(curves):
 
 
 def points_of(stored_arrays, surface, is_complete=False):
-    """`points` of the arrays from `stored`, which stay as they are."""
+    """Return `points` from the arrays of `stored`, which are not modified."""
     triangle, barycentric, vertices = stored_arrays
     if barycentric is None or triangle is None or not len(surface.mesh.triangles):
         return None

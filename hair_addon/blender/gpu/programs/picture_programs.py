@@ -58,8 +58,8 @@ MOTION_FORMAT = "RGBA32F"  # of motion vectors
 
 @shaders.cached
 def strand_motion_program(is_batch=False):
-    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp; is_batch: of linked hair
-    objects, with the sampler of picture/batch_motion.glsl.
+    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp; is_batch: for linked
+    hair objects, with the sampler of picture/batch_motion.glsl.
     """
     names = (
         "strands_before",

@@ -161,7 +161,7 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), 
 
 
 def compile_samples(info, file, replaced, is_batch):
-    """Return the compute program of a file about strands; is_batch: of linked hair objects."""
+    """Return the compute program of a file about strands; is_batch: for linked hair objects."""
     if not is_batch:
         return compile_compute(info, file, replaced)
     return compile_compute(info, file, replaced | _BATCH_REPLACED, first=_BATCH_FIRST)

@@ -120,8 +120,8 @@ LIGHT = Block(
         "wide_near": "float",
         "highlight_excess": "float",  # of R relative to its other light, less one
         "group": "int",  # light group, by `lights.group_of`
-        "pattern": "mat4",  # the world's axes in those of the lamp, and RGB factors of its pattern
-        "pattern_layer": "int",  # of the patterns' texture, counted from one; 0 without a pattern
+        "pattern": "mat4",  # the world's axes in the axes of the lamp, and RGB factors of the pattern
+        "pattern_layer": "int",  # layer in the texture of patterns, counted from one; 0 without a pattern
         "dimmed_behind": "float",  # fraction of its light that is left out where it shines towards the viewer
     },
 )

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides kept outside of their surface as it is posed: after each event of a stroke, when
-guides are added, and by Push Outside.
+"""Guides kept outside of their posed surface: after each event of a stroke, when guides are added, and by Push
+Outside.
 
 Points are pushed out from root to tip; roots and segment lengths do not change. All surfaces are scaled to the size of
 a head, so that tolerances do not depend on the units of a scene.
@@ -54,8 +54,9 @@ def push(datablock: Curves, settings: OutsideSettings, depsgraph: Depsgraph) -> 
 
 
 def push_new(datablock: Curves, former: np.ndarray, depsgraph: Depsgraph) -> None:
-    """Push guides outside that were added after guides with local points (N, 3): between guides on opposite sides of a
-    head, guides would pass through it.
+    """Push new guides outside: between guides on opposite sides of a head, they would pass through it.
+
+    former: (N, 3) local points of the guides before the addition.
     """
     points = curves.read_points(datablock)
     pushed = pushed_out(datablock, points[: len(former)], points, depsgraph)
@@ -98,7 +99,7 @@ def _pushed_at_rest(datablock, barrier, points, starts, changed):
     for count in np.unique(counts[(counts > 1) & (changed > 0.0)]):
         chosen = np.flatnonzero((counts == count) & (changed > 0.0))
         places = starts[chosen][:, None] + np.arange(count)
-        are_all = len(places) * count == len(points)  # copying all points would take a fifth of the time of this
+        are_all = len(places) * count == len(points)  # a copy of all points would take a fifth of the time
         shape = barrier.surface.from_local(points.reshape(-1, count, 3) if are_all else points[places])
         if not np.isfinite(shape).all():
             return points

@@ -16,7 +16,7 @@ from . import world_panorama
 
 SAMPLES = 2  # per pixel
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
-_MARGIN = 0.02  # of the latitudes
+_MARGIN = 0.02  # additional part of the latitudes
 _ENERGY = 1e6  # of the light, for pixels of about one
 
 # Settings of a light that Vellus reads beside its nodes, by which Cycles would multiply the panorama.
@@ -56,7 +56,7 @@ def render(path, name, matrix, frame, is_coarse, out):
     pixels = light_panoramas.SIZE if light.type == "SPOT" else light_panoramas.WIDE_SIZE
     world_panorama.set_up(scene, SAMPLES, light_panoramas.COARSE_SIZE if is_coarse else pixels)
     scene.cycles.max_bounces = 0
-    # Below are the directions in which the light shines. Others stay black.
+    # The light shines into the lower latitudes. The others stay black.
     scene.render.use_border, scene.render.use_crop_to_border = True, False
     scene.render.border_min_x, scene.render.border_max_x = 0.0, 1.0
     scene.render.border_min_y, scene.render.border_max_y = 0.0, _lit_part(light)
@@ -73,7 +73,7 @@ def render(path, name, matrix, frame, is_coarse, out):
 
 
 def _lit_part(light):
-    """Return the part of all latitudes, from below, that a light can reach."""
+    """Return the part of all latitudes, counted from below, that a light can reach."""
     half = {"SPOT": 0.5 * getattr(light, "spot_size", 0.0), "AREA": 0.5 * math.pi}.get(light.type, math.pi)
     return min(half / math.pi + _MARGIN, 1.0)
 

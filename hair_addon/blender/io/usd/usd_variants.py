@@ -109,7 +109,7 @@ def _define(group, set_name, names):
 
 
 def _write_mean(strands, look, has_radial):
-    """Write the color and roughness, possibly also radial, of a look as one value for all strands."""
+    """Write one color, roughness and, if wanted, radial roughness of a look for all strands."""
     from pxr import Gf, Sdf, UsdGeom
 
     color = Gf.Vec3f(*map(float, appearance.mean_color(look)))

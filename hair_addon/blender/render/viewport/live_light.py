@@ -412,7 +412,7 @@ class LiveLight:
         share = min(max(goal // _SHARES, _LEAST_SHARE), _MOST_SHARE)
         is_on_gpu = self._paths is not None and not self._paths.grid.device.is_cpu
         if is_on_gpu:
-            share = _MOST_SHARE  # fewer take as long
+            share = _MOST_SHARE  # fewer paths would take as long
         if self._tried < goal or self._paths is None:
             return share
         grown = int(_GROWTH * self._tried)

@@ -215,7 +215,7 @@ def drawn_scene_of(context):
 
 
 def _relit(context, drawn):
-    """Return a `DrawnScene` of the context's viewport after only lamps have changed: hair and surfaces stay."""
+    """Return a `DrawnScene` of the context's viewport after changes of lamps alone, with the same hair and surfaces."""
     depsgraph, maps = context.evaluated_depsgraph_get(), drawn.shadow_maps
     return drawn_scene.relit(drawn, context.scene, context.view_layer, depsgraph, drawn.light, maps, is_ours(context))
 

@@ -29,7 +29,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _STEPS = 160  # of the longest way over the surface
 _TAIL_POINTS = 300
-_NEAR_ROOT = 1.5  # power of places on the way to a braid: close points where hair rises, so that it stays outside
+_NEAR_ROOT = 1.5  # exponent of the spacing on the way to a braid: dense where hair rises, so that it stays outside
 _BULGE = 0.25  # height of loose hair relative to its way
 
 
@@ -174,8 +174,8 @@ def _in_row(points, ways_and_ranks, surface_below, settings):
 
 
 def _evenly(ways, count, power=1.0):
-    """Return (S, count, 3) points along ways (S, K, 3), from their first point to their last: at equal distances, or
-    with powers above 1 closer to each other near the first.
+    """Return (S, count, 3) points along ways (S, K, 3), from the first point to the last: at equal distances, or denser
+    near the first point if power is above 1.
     """
     along = np.concatenate([np.zeros((len(ways), 1)), np.linalg.norm(np.diff(ways, axis=1), axis=2).cumsum(axis=1)], 1)
     found = np.empty((len(ways), count, 3))

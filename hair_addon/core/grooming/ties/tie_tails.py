@@ -2,8 +2,8 @@
 """The way of gathered hair behind its tie: along a drawn line, as one tail, a rope or a braid.
 
 Hair keeps its place in the disk of the tie, in frames that are carried along the line by least rotations [Bishop75].
-Ropes and braids end in a second tie and a tuft. All guides have their points at the same places of a rope or braid: a
-strand is a mean of its guides, and a mean of different places of a lock lies outside of the braid.
+Ropes and braids end in a second tie and a tuft. Points of all guides are at the same places along a rope or
+braid: a strand is a mean of its guides, and a mean of different places along a lock lies outside of the braid.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from .gather_settings import GatherSettings
 
 _SAMPLES = 800  # points of a line
 LOCKS = {"BRAID": 3, "CORNROWS": 3, "ROPE": 2}  # number of locks of a tail
-_OF_PITCH = 8  # least number of segments in which a lock returns to its place, and crosses the middle four times
-_ON_WAY = 0.25  # share of the segments of a guide that are on its way; fewer would cut through the head
+_OF_PITCH = 8  # minimum number of segments per pitch, in which a lock crosses the middle four times
+_ON_WAY = 0.25  # fraction of a guide's segments before the tie; fewer would cut through the head
 _TAPER = 0.35  # radius of the tail's end, relative to its widest place
 _NARROWING = 0.65  # radius of a braid near its second tie, relative to its widest place
 _SECOND_TIE, _TUFT, _TIP = 0.45, 0.55, 0.12  # radii of the second tie, the tuft and its tip, relative to the braid
@@ -130,23 +130,24 @@ def braided(
 
 
 def segment_counts(count: int) -> tuple[int, int]:
-    """Return how many of a guide's segments are on its way to the tie, and how many behind it."""
+    """Return the number of a guide's segments before the tie, and their number behind it."""
     on_way = max(1, round(_ON_WAY * count))
     return on_way, count - on_way
 
 
 def second_tie(along: np.ndarray, radius: float, reach: float) -> float:
-    """Return the place [m] of the second tie of a braid of a radius [m], at one of its points (M,) [m].
+    """Return the place [m] of the second tie of a braid: one of the points `along` (M,) [m].
 
-    reach: length [m] of the braid's part that hangs free.
+    radius: [m] of the braid; reach: length [m] of its free part.
     """
     step = float(along[1] - along[0])
     return float(along[-1]) - step * round(min(_TUFT_LENGTH * radius, _TUFT_PART * reach) / step)
 
 
 def narrowed(along: np.ndarray, start: float, end: float, radius: float) -> np.ndarray:
-    """Return factors (M,) of the radius [m] of a braid at places (M,) [m]: it narrows from start to its second tie at
-    end, and continues as a tuft.
+    """Return factors (M,) of the radius [m] of a braid at places (M,) [m].
+
+    The braid narrows from `start` to its second tie at `end`, and continues as a tuft.
     """
     before = 1.0 - (1.0 - _NARROWING) * ease((along - start) / max(end - start, 1e-9))
     tied = 1.0 - (1.0 - _SECOND_TIE) * ease(1.0 - (end - along) / radius)

@@ -27,8 +27,8 @@ class Surroundings:
     (N,) mean irradiance of lamps; world: (H, W, 3) radiance, an equirectangular picture as in
     core/imaging/environment.py; gloss: (F, 3) roughness, metallic, and reflectance at normal incidence of triangles,
     None if all are matte; is_seen: (F,) bool, whether triangles hide hair from the viewer, None if all do; patterns:
-    (L, H, W, 3) light of lamps by latitude and longitude around their axes, by their `pattern_layer`, None if no
-    lamp has a pattern.
+    (L, H, W, 3) light of each `pattern_layer` of lamps, by latitude and longitude around the axes of the lamp, None if
+    no lamp has a pattern.
     """
 
     corners: np.ndarray
@@ -112,7 +112,7 @@ def sources_of(surroundings: Surroundings, faint: float) -> Sources:
     if layers.max(initial=0) > len(patterns):
         raise ValueError(f"a lamp has pattern {layers.max()} of {len(patterns)}")
     sources.pattern, sources.pattern_rows = wp.array(layers, dtype=int), patterns.shape[1]
-    # A record has the axes by columns: see `uniforms.Block`.
+    # Records store the axes in columns: see `uniforms.Block`.
     axes = np.ascontiguousarray(lamps["pattern"][:, :, :3], np.float32)
     axes[:, :3] = axes[:, :3].swapaxes(1, 2)
     sources.pattern_axes = wp.array(axes, dtype=wp.vec3, shape=(len(lamps), 4))

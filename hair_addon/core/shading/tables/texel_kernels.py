@@ -233,7 +233,7 @@ def azimuthal_means(
     caustic = Caustic.at(cosines, settings, sigma_a)
     rows = (caustic.phi_c, caustic.fade, caustic.area)
     shape = (len(cosines), len(edges) - 1)
-    # No `wp.ScopedDevice`: the default device is that of all threads, and viewports bake in a thread.
+    # `wp.ScopedDevice` would change the default device of all threads, and viewports bake in a thread.
     given = (edges, cosines, sigma_a, *rows)
     sent = [wp.array(np.ascontiguousarray(values), dtype=F, device=device) for values in given]
     lobes = [wp.zeros((*shape, count), dtype=float, device=device) for count in (1, len(sigma_a), len(sigma_a))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lone strands with a map have, in each engine, the color that the engine gives hair of this color alone."""
+"""In each engine, lone strands with a map have the color of hair with this single color."""
 
 import itertools
 
@@ -15,7 +15,7 @@ from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.shading.appearance import Appearance
 from tests.support.pictures import rendering
 
-COLORS = ((0.6, 0.25, 0.1), (0.1, 0.2, 0.5), (0.03, 0.02, 0.02))  # of each third strand
+COLORS = ((0.6, 0.25, 0.1), (0.1, 0.2, 0.5), (0.03, 0.02, 0.02))  # of every third strand
 COUNT, SIZE, WIDTH = 6, 64, 1.6
 PITCH, DEPTH = 0.24, 3.0  # [m] between strands, across and along the view: they hardly light each other
 
