@@ -208,6 +208,7 @@ def _keep_outside(
     last = points[strand, 0]
     out_points[strand, 0] = last
     is_moved = int(0)
+    is_sure = int(0)  # whether the last point is outside; unknown behind points that do not move, or are stuck inside
     clear = float(0.0)  # distance that can be traveled before a surface may be near
     for i in range(1, first_moved[strand]):
         last = points[strand, i]
@@ -231,6 +232,7 @@ def _keep_outside(
             if known.shape[0] > 0:
                 clear = known[row, i][3] - wp.length(place - _place_of(known[row, i]))
                 if clear > 0.0:
+                    is_sure = 1
                     out_points[strand, i] = place
                     last = place
                     continue
@@ -254,7 +256,11 @@ def _keep_outside(
                         if step <= _ROUNDS + _TURNS:
                             place = last + size * wp.normalize(place - last)
             clear = gap - surface.largest_distance
-            if known.shape[0] > 0 and lack <= _NEAR:
+            if lack > _NEAR:
+                is_sure = 0
+            elif gap < radius:  # otherwise outside only if the last point is
+                is_sure = 1
+            if known.shape[0] > 0 and is_sure == 1:
                 known[row, i] = _known_at(place, clear, gap, rim_low, rim_high)
         out_points[strand, i] = place
         last = place

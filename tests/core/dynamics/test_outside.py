@@ -122,3 +122,18 @@ def test_strands_that_are_known_again_are_moved_alike(rng, is_open):
         strands[chosen], moved_count = wanted, moved_count + is_moved.sum()
         chosen = rng.permutation(200)[: 150 + event]
     assert moved_count > 100
+
+
+def test_points_are_not_taken_for_outside_where_points_that_do_not_move_were_inside(rng):
+    """Held points may be deep inside, where the search does not reach the surface; later all but the roots are free."""
+    mesh = subdivided_sphere(2, 0.1)
+    corners = mesh.vertices[mesh.triangles[:200]].astype(np.float64)
+    inward = -corners.mean(axis=1) / np.linalg.norm(corners.mean(axis=1), axis=1, keepdims=True)
+    strands = corners.mean(axis=1)[:, None] + np.linspace(0.0, 0.2, 21)[:, None] * inward[:, None]
+    obstacle = Obstacle("Ball", mesh.vertices.astype(np.float64), mesh.triangles, distance=1e-4)
+    searched, known = (Barrier([obstacle], np.zeros(3), strands.size // 3) for _ in range(2))
+    for _event in range(8):
+        held = rng.integers(1, 12, 200)
+        wanted, _is_moved = searched.moved(strands, held)
+        np.testing.assert_array_equal(known.moved(strands, held, np.arange(200))[0], wanted)
+        strands = wanted + np.linspace(0.0, 1.0, 21)[:, None] * 0.04 * rng.normal(size=(200, 1, 3))
