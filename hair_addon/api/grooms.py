@@ -15,6 +15,7 @@ from ..core.files import settings_file
 from ..core.files.settings_file import GroomSettings, require_styles
 from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands, check_strands
+from ..core.grooming import densities, groom_defaults
 from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import Progress, no_progress, run_now
 from ..core.params import require_class
@@ -46,7 +47,8 @@ def distribute_guides(
 
     surface: a mesh object, for which new guide Curves are returned, or (vertices (V, 3) [m], triangles (F, 3)), for
     which `Strands` are returned; settings: `GuideSettings`; changes: its fields by name; progress(step, part):
-    callback. The length is computed from the surface unless given.
+    callback. The length is computed from the surface unless given. guide_density, in guides per square centimeter,
+    sets their number.
 
     >>> surface = bpy.data.objects["Scalp"]
     >>> guides = api.distribute_guides(surface, guide_count=50, length=0.3)
@@ -56,7 +58,8 @@ def distribute_guides(
     settings, progress = changed(GuideSettings, settings, changes), checked_progress(progress)
     if are_arrays(surface):
         require_no_names(settings)
-        return dynamics.draped_growth.grow(mesh_of(surface), settings, progress=progress)
+        mesh = mesh_of(surface)
+        return dynamics.draped_growth.grow(mesh, _counted(settings, mesh), progress=progress)
     work = blender.groom.pipeline.distributing_guides(_grown_on(surface), settings, _depsgraph())
     return run_now(work, progress)
 
@@ -76,7 +79,8 @@ def interpolate_hair(
     guides: guide Curves, for which new hair Curves are returned, or `Strands` of guides on a `mesh` of arrays, for
     which `Strands` are returned; settings: `HairSettings`; styles: in the order of application; masks: for plain
     arrays, weights (V,) of vertices by the names that styles use; changes and progress: as in `distribute_guides`.
-    Radius and influence distance are computed from the surface unless given. Strands use the mask of their guides
+    Radius and influence distance are computed from the surface unless given. strand_density, in strands per square
+    centimeter, sets their number. Strands use the mask of their guides
     unless `density_group` is set; with plain arrays, they cover the whole mesh.
 
     >>> hair = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=2000, radius=0.001)
@@ -89,7 +93,8 @@ def interpolate_hair(
         if mesh is None:
             raise HairError("Guides given as arrays need their surface: pass its arrays as mesh=.")
         require_no_names(settings)
-        return styled_strands(mesh_of(mesh), guides, settings, styles, masks, progress)
+        ground = mesh_of(mesh)
+        return styled_strands(ground, guides, _counted(settings, ground), styles, masks, progress)
 
     if masks is not None:
         raise HairError("masks are for plain arrays: name a vertex group of the surface in the style.")
@@ -207,6 +212,11 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
 
 def _curves(given, kind=None):
     return blender.data.arguments.curves_of(given, kind)
+
+
+def _counted(settings, mesh):
+    """Return settings with the number for their density on a whole `TriMesh`. Raises `HairError`."""
+    return densities.counted(settings, groom_defaults.grown_area(mesh)) if densities.is_set(settings) else settings
 
 
 def _grown_on(given):

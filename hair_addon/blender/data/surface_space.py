@@ -16,6 +16,8 @@ _STORED_SURFACE = "vellus_stood_on"  # the surface, when strands were rooted on 
 _APPLIED = "vellus_applied"
 _KNOWN_AS = "vellus_known_as"
 
+_SAME_SCALE = 1e-5  # tolerance of squared scales: Blender's matrices have single precision
+
 
 def to_world(an_object, depsgraph=None):
     """Return the `Affine` from an object's local coordinates to the world, in a depsgraph's frame if one is given."""
@@ -27,6 +29,15 @@ def is_flattened(an_object):
     """Whether an object's scale is zero along an axis or its transform is not finite: nothing can be placed on it."""
     to_world_axes = np.array(an_object.matrix_world.to_3x3(), np.float64)
     return not np.isfinite(to_world_axes).all() or bool(abs(np.linalg.det(to_world_axes)) < 1e-30)
+
+
+def has_scale(an_object, axes):
+    """Whether an object has the scale of axes (3, 3) from local coordinates to the world; it may be turned."""
+    present = np.array(an_object.matrix_world.to_3x3(), np.float64)
+    if not np.isfinite(present).all() or (np.linalg.det(present) < 0.0) != (np.linalg.det(axes) < 0.0):
+        return False
+    squares, known = present.T @ present, axes.T @ axes
+    return bool(np.allclose(squares, known, rtol=_SAME_SCALE, atol=_SAME_SCALE * np.abs(known).max()))
 
 
 def between(an_object, surface_object):

@@ -19,7 +19,7 @@ from ...core.geometry.strands import Strands
 from ...core.grooming import following, groom
 from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
-from ..data import scene
+from ..data import scene, surface_space
 from ..data.strands import curves
 from ..data.surfaces import Surface, cage_of
 from ..host.caches import Cache
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from ...core.interpolation.guide_weights import Reach
 
 T = TypeVar("T")
-
-_SAME_SCALE = 1e-5  # tolerance of squared scales: Blender's matrices have single precision
 
 
 @dataclass
@@ -297,11 +295,7 @@ def has_scale(bound: BoundHair, surface_object: Object | None) -> bool:
     """
     if surface_object is None:
         return True
-    present, known = np.array(surface_object.matrix_world.to_3x3(), np.float64), bound.surface.to_world_axes
-    if not np.isfinite(present).all() or (np.linalg.det(present) < 0.0) != (np.linalg.det(known) < 0.0):
-        return False
-    squares, known_squares = present.T @ present, known.T @ known
-    return bool(np.allclose(squares, known_squares, rtol=_SAME_SCALE, atol=_SAME_SCALE * np.abs(known_squares).max()))
+    return surface_space.has_scale(surface_object, bound.surface.to_world_axes)
 
 
 def can_read_masks(bound: BoundHair, target: Curves, depsgraph: Depsgraph) -> bool:

@@ -15,7 +15,7 @@ from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
-from ...core.grooming import following, groom, hair_styles
+from ...core.grooming import densities, following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.interpolation.regions import Regions
@@ -194,7 +194,7 @@ def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph
     of_guides = guide_mask.read(surface_object, surface, depsgraph)
     of_hair = of_guides if hair_mask == guide_mask else hair_mask.read(surface_object, surface, depsgraph)
     guides = size_fitting.of_guides(guide_settings, surface, of_guides, may_drape=may_drape)
-    hair = size_fitting.of_hair(hair_settings, surface, of_hair, guide_settings.guide_count)
+    hair = size_fitting.of_hair(hair_settings, surface, of_hair, guides.settings.guide_count)
     return (guides, hair), (of_guides, of_hair)
 
 
@@ -353,7 +353,8 @@ def restyle(
     """Apply the present styles and map of the thickness to bound hair; returns whether nothing else had changed.
 
     is_drawn: whether the GPU generates the shown strands. Nothing is searched, and nothing is computed if styles are
-    unchanged: on a surface that was scaled after binding, hair keeps the scale of its binding until a style changes.
+    unchanged: on a surface that was scaled after binding, hair without a density keeps the scale of its binding until a
+    style changes.
     Raises `HairError`.
     """
     bound = bindings.of(target)
@@ -361,7 +362,7 @@ def restyle(
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
     has_scale = bindings.has_scale(bound, guide_curves.surface)
-    if not has_scale and surface_space.is_flattened(guide_curves.surface):
+    if not has_scale and (densities.is_set(settings) or surface_space.is_flattened(guide_curves.surface)):
         return False
     if not bindings.can_read_masks(bound, target, depsgraph):  # rebinding the hair reports the error
         return False

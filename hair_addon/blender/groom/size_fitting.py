@@ -11,9 +11,11 @@ import numpy as np
 from bpy.types import Curves
 
 from ...core.geometry.faces.uv_maps import Texture
-from ...core.grooming import groom_defaults
+from ...core.geometry.mesh import TriMesh
+from ...core.grooming import densities, groom_defaults
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import Settings
+from ..data.strands import attributes
 from ..data.surfaces import Surface
 from ..settings import fitted_sizes, setting_properties
 from . import grown_guides, staleness
@@ -45,8 +47,9 @@ def of_guides(
 ) -> Sized[GuideSettings]:
     """Return `GuideSettings` with unset sizes fitted; target: updated guides, whose fitted sizes are refitted.
 
-    may_drape: let `grown_guides.draped_if_new` choose draping.
+    may_drape: let `grown_guides.draped_if_new` choose draping. A density sets their number, as for strands.
     """
+    given = _counted(given, surface, mask, target)
     key = root_key(given, surface, mask)
     unchanged = _unchanged_sizes(target and target.vellus.guides, given)
     is_refitted = target is not None and target.vellus.fit_key != key
@@ -66,6 +69,7 @@ def of_hair(
     given: HairSettings, surface: Surface, mask: Mask, guide_count: int, target: Curves | None = None
 ) -> Sized[HairSettings]:
     """Return `HairSettings` with unset sizes fitted; target: as for `of_guides`."""
+    given = _counted(given, surface, mask, target)
     key = root_key(given, surface, mask)
     fit_key = f"{key} {guide_count}"
     unchanged = _unchanged_sizes(target and target.vellus.hair, given)
@@ -73,6 +77,24 @@ def of_hair(
     opened = fitted_sizes.opened(given, unchanged) if is_refitted else given
     completed = groom_defaults.complete(opened, surface.posed_mesh, *mask, guide_count)
     return Sized(completed, key, Fits(frozenset(unchanged | fitted_sizes.open_names(given)), fit_key))
+
+
+def area_of(surface: Surface, mask: Mask) -> float:
+    """Return the area [m²] that hair grows on at rest, in the scene's units, so that no frame changes densities.
+
+    A subdivided surface counts with its vertices on the smooth surface, the same at every level. Raises `HairError`.
+    """
+    mesh = surface.mesh
+    if mesh.smooth_vertices is not None:
+        mesh = TriMesh(mesh.smooth_vertices, mesh.triangles)
+    return groom_defaults.grown_area(mesh, *mask) * setting_properties.unit_length() ** 2
+
+
+def _counted(given, surface, mask, target):
+    """Return settings with the number for their density; Curves of another file keep the number stored there."""
+    if not densities.is_set(given) or (target is not None and attributes.is_from_library(target)):
+        return given
+    return densities.counted(given, area_of(surface, mask))
 
 
 def root_key(settings: Settings, surface: Surface, mask: Mask) -> str:
@@ -89,8 +111,9 @@ def keep(target: Curves, fits: Fits) -> None:
 
 
 def show(hair: Curves, settings: HairSettings, fits: Fits) -> None:
-    """Show the fitted sizes of hair that is written later, without marking it."""
-    fitted_sizes.keep_values(hair.vellus.hair, {name: getattr(settings, name) for name in fits.names})
+    """Show the number and the fitted sizes of hair that is written later, without marking it."""
+    names = fits.names | {"strand_count"}  # a density may have changed it
+    fitted_sizes.keep_values(hair.vellus.hair, {name: getattr(settings, name) for name in names})
     hair.vellus.fit_key = fits.key
 
 

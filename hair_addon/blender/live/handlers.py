@@ -25,6 +25,7 @@ from . import (
     flattened_surfaces,
     hidden_previews,
     invalidation,
+    kept_densities,
     live_hair,
     live_layers,
     moving_surfaces,
@@ -93,6 +94,8 @@ def after_depsgraph_update(scene, depsgraph):
     stale_marks.follow_partings(moved, transformed, depsgraph)
     stale_marks.follow_flow(moved, transformed, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
+    scaled = {datablock for datablock in transformed if isinstance(datablock, bpy.types.Object)}
+    kept_densities.follow(scaled, depsgraph)
     stale_marks.follow_ramps()
     reported.remember_places()
     if _is_undone:
@@ -505,5 +508,6 @@ def unregister():
     simulated_hair.end()
     moving_surfaces.resume()
     hidden_previews.unregister()
+    kept_densities.unregister()
     live_hair.write_all()
     composite.suspend()

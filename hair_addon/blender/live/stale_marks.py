@@ -8,7 +8,7 @@ import bpy
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
 from ..data.strands import curves, drawn_lines
-from ..groom import bindings, frame_faces, staleness
+from ..groom import bindings, frame_faces, kept_densities, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces
 from ..groom.surfaces.edited_surfaces import Followed
 from ..host.notices import text_of
@@ -40,6 +40,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             # Masks limit its roots. Weights on another frame's faces cannot be compared.
             is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
+                state.is_stale = True
+            elif was_edited and is_placed and kept_densities.have_other_number(guides, depsgraph):
                 state.is_stale = True
         except HairError as error:
             state.status = str(error)

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.grooming import densities
 from ...core.params import declared, from_surface, label_of
 from ..host.notices import text_of
 from . import fitted_sizes, length_steps
@@ -110,15 +111,15 @@ def _diameter_property(radius, name, description, details, update):
 
 
 def _millimeters_of(radius):
-    return 2e3 * _unit_length() * radius
+    return 2e3 * unit_length() * radius
 
 
 def _radius_of(millimeters):
-    return shortest(millimeters) / (2e3 * _unit_length())
+    return shortest(millimeters) / (2e3 * unit_length())
 
 
-def _unit_length():
-    """Meters in a unit of the scene."""
+def unit_length():
+    """Return the meters in a unit of the scene."""
     scene = getattr(bpy.context, "scene", None)  # no scene exists while add-ons are registered
     return 1.0 if scene is None else scene.unit_settings.scale_length
 
@@ -209,8 +210,14 @@ def given_settings(operator, settings_class, skip=()):
 
 
 def show(operator, group, settings_class):
-    """Show sizes in an operator's redo panel. Fitted sizes are computed again when another setting changes."""
+    """Show sizes, and the number for a density, in an operator's redo panel.
+
+    Fitted sizes are computed again when another setting changes.
+    """
     fitted_sizes.show(operator, group, settings_class)
+    for density, count in densities.COUNTS.items():
+        if density in names_of(settings_class) and getattr(group, density) > 0.0:
+            setattr(operator, count, getattr(group, count))
     for radius, diameter in diameters(settings_class):
         setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 

@@ -4,6 +4,7 @@
 import bpy
 
 from ...core.dynamics.rod.settings import DynamicsSettings
+from ...core.grooming import densities
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.maps import varied_settings
 from ...core.params import declared
@@ -55,10 +56,14 @@ def row(layout, owner, name, size="", map_of=""):
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
     shown, flag = length_steps.shown_name(owner, name), fitted_sizes.flag_of(size or name)
     has_flag, is_coarse = flag in owner.bl_rna.properties, shown != name
-    sides = value_side.row(align=True) if has_flag or is_coarse or map_of else value_side
+    is_density = name in densities.COUNTS and isinstance(owner.id_data, bpy.types.Curves)
+    sides = value_side.row(align=True) if has_flag or is_coarse or map_of or is_density else value_side
     sides.prop(owner, shown, text="")
     if has_flag:
         sides.prop(owner, flag, text="", icon="LINKED")
+    if is_density:
+        is_kept = getattr(owner, name) > 0.0
+        sides.operator("vellus.keep_density", text="", icon="LINKED", depress=is_kept).density = name
     if is_coarse:
         sides.prop_decorator(owner, name)  # to key it
     if map_of:
@@ -98,7 +103,18 @@ def rows(layout, owner, settings_class, names, style=""):
                 else ""
             )
             is_stored = varied != "" and isinstance(getattr(owner, "id_data", None), bpy.types.Curves)  # not redo
-            row(layout, owner, details.diameter[0] if details.diameter else name, name, varied if is_stored else "")
+            shown = details.diameter[0] if details.diameter else name
+            row(_of_number(layout, owner, name), owner, shown, name, varied if is_stored else "")
+
+
+def _of_number(layout, owner, name):
+    """Return the layout of a row: gray for a number that a density sets."""
+    density = next((density for density, count in densities.COUNTS.items() if count == name), "")
+    if not hasattr(owner, density):
+        return layout
+    column = layout.column()
+    column.active = getattr(owner, density) == 0.0
+    return column
 
 
 def mesh_rows(layout, owner, settings_class):

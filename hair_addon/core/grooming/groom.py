@@ -44,6 +44,13 @@ class GuideSettings(Settings):
         high=1_000_000,
         soft_high=4000,
     )
+    guide_density: float = param(
+        0.0,
+        "Guides per square centimeter, kept when the surface, its scale or its mask changes; at 0, Guide Count is kept",
+        low=0.0,
+        high=1e6,
+        soft_high=10.0,
+    )
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     density_group: str = param(
         "",
@@ -134,6 +141,14 @@ class HairSettings(Settings):
         low=1,
         high=10_000_000,
         soft_high=100_000,
+    )
+    strand_density: float = param(
+        0.0,
+        "Strands per square centimeter, kept when the surface, its scale or its mask changes; at 0, Strand Count is "
+        "kept",
+        low=0.0,
+        high=1e6,
+        soft_high=300.0,
     )
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
     density_group: str = param(

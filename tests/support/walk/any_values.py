@@ -15,6 +15,8 @@ LEFT_OUT = {"play_dynamics"}
 _MOST = {
     "guide_count": 20,
     "strand_count": 60,
+    "guide_density": 2e-4,
+    "strand_density": 1e-3,
     "point_count": 20,
     "relax_iterations": 3,
     "card_count": 6,

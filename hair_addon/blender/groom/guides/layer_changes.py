@@ -146,6 +146,7 @@ def _grown_base(guides, depsgraph):
     """Return the points (N, 3) that settings would grow at the roots of combed guides, in local coordinates."""
     surface = read_surfaces.read(guides.surface, depsgraph)
     settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
+    settings = replace(settings, guide_density=0.0)  # the roots are known
     mask = masks.own(settings).read(guides.surface, surface, depsgraph)
     settings = size_fitting.of_guides(settings, surface, mask, guides).settings
     flow = drawn_lines.read(guides.surface, surface, settings.flow_lines, depsgraph)

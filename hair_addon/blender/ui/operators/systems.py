@@ -8,7 +8,7 @@ from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings, HairSettings
 from ...data import scene
 from ...data.strands.curves import followers, require_editable
-from ...groom import pipeline
+from ...groom import kept_densities, pipeline
 from ...groom.guides import brushes, line_drawing
 from ...groom.selection import (
     active_of_kind,
@@ -170,6 +170,34 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
 
     def message(self, made):
         return "{count} strands", {"count": len(made.curves)}
+
+
+class VELLUS_OT_keep_density(HairOperator, bpy.types.Operator):
+    """Keep the present number of strands or guides per area when the surface changes, or stop keeping it"""
+
+    bl_idname = "vellus.keep_density"
+    bl_label = "Keep Density"
+    density: bpy.props.EnumProperty(
+        name="Density",
+        description="The density to keep",
+        translation_context=CONTEXT,
+        items=[
+            ("strand_density", "Strand Density", "Strands per square centimeter"),
+            ("guide_density", "Guide Density", "Guides per square centimeter; combed guides keep their number"),
+        ],
+    )
+
+    @classmethod
+    def applies(cls, context):
+        cls.poll_message_set("Select hair or guides, in Object Mode.")
+        return context.mode == "OBJECT" and any(parts_of(context.object))
+
+    def change(self, context):
+        of_strands = self.density == "strand_density"
+        target = hair_of(context.object) if of_strands else guides_of(context.object)
+        if target is None:
+            raise HairError("Select hair." if of_strands else "Select guides.")
+        kept_densities.toggle(target, context.evaluated_depsgraph_get())
 
 
 def is_combing(context):
@@ -441,6 +469,7 @@ CLASSES = (
     VELLUS_OT_add_hair,
     VELLUS_OT_distribute_guides,
     VELLUS_OT_interpolate_hair,
+    VELLUS_OT_keep_density,
     VELLUS_OT_comb_guides,
     VELLUS_OT_draw_parting,
     VELLUS_OT_draw_flow,
