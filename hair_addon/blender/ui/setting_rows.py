@@ -56,7 +56,7 @@ def row(layout, owner, name, size="", map_of=""):
     value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
     shown, flag = length_steps.shown_name(owner, name), fitted_sizes.flag_of(size or name)
     has_flag, is_coarse = flag in owner.bl_rna.properties, shown != name
-    is_density = name in densities.COUNTS and isinstance(owner.id_data, bpy.types.Curves)
+    is_density = name in densities.COUNTS and _is_stored(owner)
     sides = value_side.row(align=True) if has_flag or is_coarse or map_of or is_density else value_side
     sides.prop(owner, shown, text="")
     if has_flag:
@@ -102,9 +102,14 @@ def rows(layout, owner, settings_class, names, style=""):
                 if details.may_vary or details.has_course
                 else ""
             )
-            is_stored = varied != "" and isinstance(getattr(owner, "id_data", None), bpy.types.Curves)  # not redo
+            is_mapped = varied != "" and _is_stored(owner)
             shown = details.diameter[0] if details.diameter else name
-            row(_of_number(layout, owner, name), owner, shown, name, varied if is_stored else "")
+            row(_of_number(layout, owner, name), owner, shown, name, varied if is_mapped else "")
+
+
+def _is_stored(owner):
+    """Whether these are settings of Curves, not of an operator in the redo panel."""
+    return isinstance(getattr(owner, "id_data", None), bpy.types.Curves)
 
 
 def _of_number(layout, owner, name):

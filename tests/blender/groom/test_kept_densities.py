@@ -167,6 +167,20 @@ def test_keep_density_keeps_the_number_and_a_second_press_stops(sphere):
     assert abs(len(hair.vellus.guide_curves.curves) - 4 * GUIDE_COUNT) <= 1
 
 
+def test_without_auto_update_the_number_waits_for_update_now(sphere):
+    hair = grow(sphere)
+    bpy.context.view_layer.objects.active = next(o for o in bpy.data.objects if o.data == hair)
+    hair.vellus.guide_curves.vellus.guides.guide_density = 0.0
+    update()
+    hair.vellus.is_live = False
+    sphere.scale = (2.0,) * 3
+    update()
+    assert len(hair.curves) == COUNT and hair.vellus.is_stale
+    bpy.ops.vellus.update_hair()
+    assert abs(len(hair.curves) - 4 * COUNT) <= 1 and not hair.vellus.is_stale
+    assert len(hair.vellus.guide_curves.curves) == GUIDE_COUNT
+
+
 def test_too_many_strands_are_refused_in_one_sentence(sphere):
     hair = grow(sphere)
     hair.vellus.hair.strand_density = 1e6
