@@ -167,16 +167,17 @@ def test_keep_density_keeps_the_number_and_a_second_press_stops(sphere):
     assert abs(len(hair.vellus.guide_curves.curves) - 4 * GUIDE_COUNT) <= 1
 
 
-def test_without_auto_update_the_number_waits_for_update_now(sphere):
+def test_without_auto_update_the_number_waits_until_it_is_on(sphere):
     hair = grow(sphere)
-    bpy.context.view_layer.objects.active = next(o for o in bpy.data.objects if o.data == hair)
     hair.vellus.guide_curves.vellus.guides.guide_density = 0.0
     update()
     hair.vellus.is_live = False
     sphere.scale = (2.0,) * 3
     update()
     assert len(hair.curves) == COUNT and hair.vellus.is_stale
-    bpy.ops.vellus.update_hair()
+    hair.vellus.is_live = True
+    hair.update_tag()
+    update()
     assert abs(len(hair.curves) - 4 * COUNT) <= 1 and not hair.vellus.is_stale
     assert len(hair.vellus.guide_curves.curves) == GUIDE_COUNT
 
