@@ -15,10 +15,11 @@ from ..core.files import settings_file
 from ..core.files.settings_file import GroomSettings, require_styles
 from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands, check_strands
-from ..core.grooming import densities, groom_defaults
+from ..core.grooming import groom_defaults
 from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import Progress, no_progress, run_now
 from ..core.params import require_class
+from ..core.placement import densities
 from ..core.shading import presets
 from ..core.shading.appearance import Appearance, shown_changes
 from ..core.styling.base import StyleSettings

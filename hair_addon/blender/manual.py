@@ -41,7 +41,7 @@ _OPERATORS = {
         "flip_normals",
     ),
     "guides": (
-        *("distribute_guides", "draw_flow"),
+        *("distribute_guides", "keep_guide_density", "draw_flow"),
         *("freeze_selected", "unfreeze_all", "invert_frozen"),
         *("save_selection", "select_saved", "remove_selection"),
         *("add_layer", "remove_layer", "duplicate_layer", "move_layer", "merge_layer_down", "apply_layers"),
@@ -51,7 +51,7 @@ _OPERATORS = {
         *("smooth_guides", "lift_guides", "attract_guides", "drape_guides", "push_outside"),
         *("draw_tie", "gather_guides", "paint_flow", "size_flow_brush"),
     ),
-    "strands": ("interpolate_hair", "keep_density", "draw_parting", "paint_density", "update_hair"),
+    "strands": ("interpolate_hair", "keep_strand_density", "draw_parting", "paint_density", "update_hair"),
     "dynamics": (
         *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset", "stiffen_dynamics"),
         *("deliver_dynamics", "remove_delivery"),

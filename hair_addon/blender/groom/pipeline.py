@@ -15,11 +15,12 @@ from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
-from ...core.grooming import densities, following, groom, hair_styles
+from ...core.grooming import following, groom, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.interpolation.regions import Regions
 from ...core.long_work import Work, no_progress, part_of, run_now
+from ...core.placement import densities
 from ...core.styling.base import StyleSettings
 from ..data import masks, scene, surface_space, whole_changes
 from ..data.strands import curves, drawn_lines, partings

@@ -12,9 +12,10 @@ from bpy.types import Curves
 
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
-from ...core.grooming import densities, groom_defaults
+from ...core.grooming import groom_defaults
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import Settings
+from ...core.placement import densities
 from ..data.strands import attributes
 from ..data.surfaces import Surface
 from ..settings import fitted_sizes, setting_properties

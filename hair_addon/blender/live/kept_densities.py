@@ -9,7 +9,8 @@ import bpy
 from ...core.errors import HairError
 from ..data import scene
 from ..data.strands import curves
-from ..groom import bindings, kept_densities
+from ..groom import bindings
+from ..groom.surfaces import kept_densities
 from ..host import running
 
 # Name prefix of operators that scale objects while a mouse button is held.

@@ -8,8 +8,8 @@ import bpy
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
 from ..data.strands import curves, drawn_lines
-from ..groom import bindings, frame_faces, kept_densities, staleness
-from ..groom.surfaces import applied_transforms, edited_surfaces
+from ..groom import bindings, frame_faces, staleness
+from ..groom.surfaces import applied_transforms, edited_surfaces, kept_densities
 from ..groom.surfaces.edited_surfaces import Followed
 from ..host.notices import text_of
 from ..settings import marks, ramp_nodes, style_items

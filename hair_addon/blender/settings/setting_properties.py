@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.grooming import densities
 from ...core.params import declared, from_surface, label_of
+from ...core.placement import densities
 from ..host.notices import text_of
 from . import fitted_sizes, length_steps
 from .translations import CONTEXT

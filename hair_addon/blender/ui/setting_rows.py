@@ -4,10 +4,10 @@
 import bpy
 
 from ...core.dynamics.rod.settings import DynamicsSettings
-from ...core.grooming import densities
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.maps import varied_settings
 from ...core.params import declared
+from ...core.placement import densities
 from ...core.styling.base import ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
 from ..host.notices import text_of
@@ -63,7 +63,7 @@ def row(layout, owner, name, size="", map_of=""):
         sides.prop(owner, flag, text="", icon="LINKED")
     if is_density:
         is_kept = getattr(owner, name) > 0.0
-        sides.operator("vellus.keep_density", text="", icon="LINKED", depress=is_kept).density = name
+        sides.operator(f"vellus.keep_{name}", text="", icon="LINKED", depress=is_kept)
     if is_coarse:
         sides.prop_decorator(owner, name)  # to key it
     if map_of:

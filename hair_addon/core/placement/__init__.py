@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         coverage,
         cvt,
+        densities,
         domain,
         exact_cells,
         farthest,

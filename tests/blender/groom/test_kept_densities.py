@@ -154,13 +154,13 @@ def test_keep_density_keeps_the_number_and_a_second_press_stops(sphere):
     bpy.ops.vellus.add_hair(guide_count=GUIDE_COUNT, strand_count=COUNT, relax_iterations=0)
     hair = bpy.context.object.data
     positions = np.array([list(point.position) for point in hair.points])
-    for density in ("strand_density", "guide_density"):
-        assert bpy.ops.vellus.keep_density(density=density) == {"FINISHED"}
+    for keep in (bpy.ops.vellus.keep_strand_density, bpy.ops.vellus.keep_guide_density):
+        assert keep() == {"FINISHED"}
     update()
     require_density(hair)
     np.testing.assert_array_equal([list(point.position) for point in hair.points], positions)
     assert hair.vellus.hair.strand_density == pytest.approx(COUNT / area_of(sphere))
-    bpy.ops.vellus.keep_density(density="strand_density")
+    bpy.ops.vellus.keep_strand_density()
     sphere.scale = (2.0,) * 3
     update()
     assert len(hair.curves) == COUNT and hair.vellus.hair.strand_density == 0.0
@@ -170,6 +170,7 @@ def test_keep_density_keeps_the_number_and_a_second_press_stops(sphere):
 def test_without_auto_update_the_number_waits_until_it_is_on(sphere):
     hair = grow(sphere)
     hair.vellus.guide_curves.vellus.guides.guide_density = 0.0
+    hair.vellus.hair.strand_density *= 1.0  # in single precision, as hair is bound now
     update()
     hair.vellus.is_live = False
     sphere.scale = (2.0,) * 3

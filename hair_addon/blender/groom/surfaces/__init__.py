@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ....core.lazy import submodules
 
 if TYPE_CHECKING:
-    from . import applied_transforms, attached_hair, edited_faces, edited_surfaces, posed_shapes
+    from . import applied_transforms, attached_hair, edited_faces, edited_surfaces, kept_densities, posed_shapes
 else:
     __getattr__ = submodules(__name__)

@@ -8,7 +8,7 @@ from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings, HairSettings
 from ...data import scene
 from ...data.strands.curves import followers, require_editable
-from ...groom import kept_densities, pipeline
+from ...groom import pipeline
 from ...groom.guides import brushes, line_drawing
 from ...groom.selection import (
     active_of_kind,
@@ -21,6 +21,7 @@ from ...groom.selection import (
     reveal,
     surface_of,
 )
+from ...groom.surfaces import kept_densities
 from ...groom.systems import copied_hair, edits, mask_suggestions
 from ...groom.systems.hair_systems import edited_system, name_guides, parts_of_system
 from ...live.live_hair import update_once
@@ -28,7 +29,7 @@ from ...render.viewport import viewport
 from ...settings import fitted_sizes, setting_properties
 from ...settings.translations import CONTEXT
 from .. import setting_rows
-from .base.hair_operator import HairOperator
+from .base.hair_operator import HairOperator, needs_guides, needs_hair
 from .base.modal import LongOperator
 
 _OWN = tuple(
@@ -172,32 +173,26 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
         return "{count} strands", {"count": len(made.curves)}
 
 
-class VELLUS_OT_keep_density(HairOperator, bpy.types.Operator):
-    """Keep the present number of strands or guides per area when the surface changes, or stop keeping it"""
+class VELLUS_OT_keep_strand_density(HairOperator, bpy.types.Operator):
+    """Keep the present number of strands per area when the surface changes, or stop keeping it"""
 
-    bl_idname = "vellus.keep_density"
-    bl_label = "Keep Density"
-    density: bpy.props.EnumProperty(
-        name="Density",
-        description="The density to keep",
-        translation_context=CONTEXT,
-        items=[
-            ("strand_density", "Strand Density", "Strands per square centimeter"),
-            ("guide_density", "Guide Density", "Guides per square centimeter; combed guides keep their number"),
-        ],
-    )
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair or guides, in Object Mode.")
-        return context.mode == "OBJECT" and any(parts_of(context.object))
+    bl_idname = "vellus.keep_strand_density"
+    bl_label = "Keep Strand Density"
+    applies = needs_hair
 
     def change(self, context):
-        of_strands = self.density == "strand_density"
-        target = hair_of(context.object) if of_strands else guides_of(context.object)
-        if target is None:
-            raise HairError("Select hair." if of_strands else "Select guides.")
-        kept_densities.toggle(target, context.evaluated_depsgraph_get())
+        kept_densities.toggle(hair_of(context.object), context.evaluated_depsgraph_get())
+
+
+class VELLUS_OT_keep_guide_density(HairOperator, bpy.types.Operator):
+    """Keep the present number of guides per area when the surface changes, or stop keeping it"""
+
+    bl_idname = "vellus.keep_guide_density"
+    bl_label = "Keep Guide Density"
+    applies = needs_guides
+
+    def change(self, context):
+        kept_densities.toggle(guides_of(context.object), context.evaluated_depsgraph_get())
 
 
 def is_combing(context):
@@ -469,7 +464,8 @@ CLASSES = (
     VELLUS_OT_add_hair,
     VELLUS_OT_distribute_guides,
     VELLUS_OT_interpolate_hair,
-    VELLUS_OT_keep_density,
+    VELLUS_OT_keep_strand_density,
+    VELLUS_OT_keep_guide_density,
     VELLUS_OT_comb_guides,
     VELLUS_OT_draw_parting,
     VELLUS_OT_draw_flow,

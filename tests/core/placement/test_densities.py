@@ -8,8 +8,8 @@ import pytest
 
 from hair_addon import api
 from hair_addon.core.errors import HairError
-from hair_addon.core.grooming import densities
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from hair_addon.core.placement import densities
 
 KINDS = (GuideSettings(guide_density=0.5), HairSettings(strand_density=0.5))
 

@@ -3,12 +3,12 @@
 
 from bpy.types import Curves, Depsgraph
 
-from ...core.grooming import densities
-from ...core.grooming.groom import GuideSettings, HairSettings
-from ..data import masks, surface_space
-from ..data.strands import attributes, curves
-from ..settings import setting_properties
-from . import bindings, pipeline, read_surfaces, size_fitting
+from ....core.grooming.groom import GuideSettings, HairSettings
+from ....core.placement import densities
+from ...data import masks, surface_space
+from ...data.strands import attributes, curves
+from ...settings import setting_properties
+from .. import bindings, pipeline, read_surfaces, size_fitting
 
 
 def toggle(target: Curves, depsgraph: Depsgraph) -> None:
