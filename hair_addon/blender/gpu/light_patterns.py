@@ -38,10 +38,26 @@ def _new(panoramas):
     return texture
 
 
+def parts_at(lamps, panoramas, places):
+    """Return RGB (N, P, 3) that patterns let arrive at places (P, 3), relative to the light that the power of lamps
+    (N,) contains: `uniforms.LIGHT` records.
+    """
+    found = np.ones((len(lamps), len(places), 3))
+    for index in np.flatnonzero(lamps["pattern_layer"]):
+        lamp = lamps[index]
+        pattern = panoramas[lamp["pattern_layer"] - 1].coarse_pattern
+        along = (places - lamp["position"][:3]) @ lamp["pattern"][:3, :3]
+        x, y, z = (along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-6)).T
+        height, width, _rgb = pattern.shape
+        rows = height * (0.5 + np.arcsin(np.clip(z, -1.0, 1.0)) / np.pi)
+        columns = width * (0.5 - np.arctan2(y, x) / (2.0 * np.pi))
+        rows, columns = (np.clip(one.astype(int), 0, side - 1) for one, side in ((rows, height), (columns, width)))
+        found[index] = pattern[rows, columns] * lamp["pattern"][3, :3]
+    return found
+
+
 def of_paths(panoramas):
     """Return patterns (L, H, W, 3) of panoramas for `media.Surroundings`, at half the resolution; None without any."""
     if not panoramas:
         return None
-    width, height = SIZE
-    blocks = len(panoramas), height // 2, 2, width // 2, 2, 3
-    return np.stack([panorama.pattern for panorama in panoramas]).reshape(blocks).mean(axis=(2, 4))
+    return np.stack([panorama.coarse_pattern for panorama in panoramas])

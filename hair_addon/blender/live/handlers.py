@@ -129,6 +129,8 @@ def after_depsgraph_update(scene, depsgraph):
             hidden_previews.hair_changed(hair, is_seen)
     animated.follow(depsgraph)
     simulated_hair.follow_settings(scene, depsgraph)
+    if _is_light_only(reports) and any(map(_is_outdated, bpy.data.hair_curves)):
+        events.scene_changed()  # styles may read lamps, and settings may be driven by them
     _evaluate(depsgraph, combed)
     simulated_hair.note_combed(combed, scene)
     if running.job() is None:
@@ -174,6 +176,11 @@ def _is_light_only(reports):
     return len(owners) > 0 and all(
         report.is_of(bpy.types.Light) or _type_of_object(report) == "LIGHT" for report in owners
     )
+
+
+def _is_outdated(datablock):
+    """Whether guides or hair are about to be evaluated."""
+    return datablock.vellus.is_live and (datablock.vellus.is_stale or datablock.vellus.is_shading_stale)
 
 
 def _is_own_tree(report):

@@ -7,8 +7,12 @@ import pytest
 
 from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import ambient_visibility
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.host import running
+from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.render.viewport import viewport
+from hair_addon.blender.settings import style_items
+from hair_addon.core.styling import lean
 from tests.support.pictures.viewports import context_of, view3d
 from tests.support.reading import points, write_points
 
@@ -161,3 +165,19 @@ def test_lamps_that_change_leave_hair_and_surfaces_as_they_were(lit, monkeypatch
     bpy.context.view_layer.update()
     shown(is_rendered)
     assert calls
+
+
+def test_hair_whose_style_reads_a_lamp_is_read_again(lit, monkeypatch):
+    """Hair that leans along the axis of a lamp is drawn in its new shape as soon as the lamp turns."""
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    style_items.assign(lit.data.vellus, [lean.Settings(direction="OBJECT", target="Sun")])
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    before = shown(is_rendered=False).hair[0][0].texture.read()
+    LAMP_CHANGES["moves"]()
+    bpy.context.view_layer.update()
+    followed = shown(is_rendered=False).hair[0][0].texture.read()
+    live_hair.write_all()
+    assert not np.array_equal(before, followed)
+    np.testing.assert_array_equal(followed, hair_cache.strands_on_gpu(lit.data).texture.read())

@@ -44,6 +44,12 @@ class Panorama:
         rows, columns = (np.arange(side) * count // side for side, count in zip(SIZE[::-1], ratio.shape, strict=False))
         return ratio[rows[:, None], columns]
 
+    @cached_property
+    def coarse_pattern(self):
+        """`pattern` with half as many pixels along each side."""
+        width, height = SIZE
+        return self.pattern.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
+
     @staticmethod
     def axes(matrix):
         """Unit axes (3, 3) of a lamp with a matrix (4, 4), one in each column."""

@@ -12,7 +12,7 @@ import os
 import sys
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -24,7 +24,7 @@ from ....core.imaging import lamps
 from ....core.long_work import Job, Stopped
 from ....core.shading import light_paths as paths
 from ...data.pictures import viewport_shading
-from ...gpu import drawing, light_grid
+from ...gpu import drawing, light_grid, light_patterns
 from ...host import running, scene_time
 from ...host.caches import Cache
 from ...host.notices import say
@@ -186,6 +186,7 @@ class _Content:
     hair: tuple  # (StrandsOnGPU, Shading, (4, 4) to world)
     lights: np.ndarray  # vector irradiance around the hair by lamp and channel, then the world's sides
     blockers: tuple  # (texture of places, corners, (4, 4) to world) of surfaces
+    patterns: tuple  # `Panorama`s of lamps, then their axes and positions as bytes
     centre: np.ndarray  # (3,) of the hair [m]
     radius: float
 
@@ -196,6 +197,8 @@ class _Content:
         known = _unchanged(self.lights, before.lights)
         if not self._has_blockers_of(before):
             known *= _OTHER
+        if self.patterns != before.patterns:
+            known *= _OTHER  # a pattern also changes between the places of `lights`
         counts = np.array([strands.strand_count for strands, *_ in self.hair], float)
         parts = [self._part_of(now, then, before) for now, then in zip(self.hair, before.hair, strict=True)]
         part = known * float(np.dot(counts, parts) / max(counts.sum(), 1.0))
@@ -225,7 +228,8 @@ class _Content:
         is_hair = len(self.hair) == len(before.hair) and all(
             now[0] is then[0] and now[1] is then[1] and np.array_equal(now[2], then[2]) for now, then in pairs
         )
-        return is_hair and self._has_blockers_of(before) and np.array_equal(self.lights, before.lights)
+        is_light = self.patterns == before.patterns and np.array_equal(self.lights, before.lights)
+        return is_hair and is_light and self._has_blockers_of(before)
 
     def _has_blockers_of(self, before):
         return len(self.blockers) == len(before.blockers) and all(
@@ -239,23 +243,25 @@ class _Content:
 
 
 def _replaced(content, other):
-    return _Content(content.hair, other.lights, other.blockers, content.centre, content.radius)
+    return replace(content, lights=other.lights, blockers=other.blockers, patterns=other.patterns)
 
 
 def _content_of(drawn):
     """Return the `_Content` of a `DrawnScene`."""
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    found = drawn.lamps.lamps
+    found, patterns = drawn.lamps.lamps, drawn.lamps.patterns
     of_world = np.pi * drawn.lights["world"][:, :3].astype(float).ravel() / 3.0
-    arriving = np.zeros(0)
+    arriving, patterned = np.zeros(0), found[found["pattern_layer"] > 0]
     if len(found):
         to_lamps, amount = lamps.directions_to(found, places), lamps.irradiance(found, places)
+        amount = amount * light_patterns.parts_at(found, patterns, places)
         arriving = (to_lamps[..., None] * amount[..., None, :]).ravel() / len(places)
     return _Content(
         tuple(hair[:3] for hair in drawn.hair),
         np.concatenate([of_world, arriving]),
         tuple((one.places, one.corners, one.to_world) for one in (blocker.surface for blocker in drawn.blockers)),
+        (*patterns, patterned["pattern"][:, :3].tobytes(), patterned["position"].tobytes()),
         centre,
         radius,
     )

@@ -13,6 +13,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data import scene as scene_data
+from hair_addon.blender.data.pictures import light_panoramas
 from hair_addon.blender.render import drawn_scene, light_paths
 from hair_addon.blender.render.viewport import hair_picture, live_light
 from hair_addon.core.long_work import Stopped
@@ -206,6 +207,21 @@ def test_changed_lights_are_forgotten(view):
     expected = light_paths.with_grid(read(), *camera, 4 * PATHS)
     found, expected = (blocks(picture_of(one, camera)) for one in (found, expected))
     assert np.abs(found - expected).mean() < 0.04 * expected.mean()
+
+
+def test_the_light_of_a_pattern_that_turns_is_forgotten(view, monkeypatch):
+    """A lamp that lights the other half of the hair, and sends as much light, leaves little of its former light."""
+    half = np.zeros((32, 64, 3))
+    half[:, 16:48] = 1.0  # along the lamp's x axis
+    panorama = light_panoramas.Panorama(half, np.ones((32, 64)))
+    monkeypatch.setattr(light_panoramas, "find", lambda light, *_given: panorama if light.type == "POINT" else None)
+    lamp = bpy.data.objects["Sun"]
+    lamp.data.type, lamp.data.energy, lamp.location, lamp.rotation_euler = "POINT", 300.0, (0.0, -3.0, 0.0), (0, 0, 0)
+    camera, read = view
+    live = live_light.LiveLight()
+    assert part_of(at_rest(live, read(), camera)) > 0.9
+    lamp.rotation_euler = (0.0, np.pi, 0.0)
+    assert part_of(redrawn(live, read(), camera, may_follow=False)) < 0.1
 
 
 def test_light_moves_with_its_hair(view):
