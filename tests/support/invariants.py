@@ -57,14 +57,13 @@ def orphans():
 
 
 def waits_elsewhere():
-    """Whether hair waits for the end of an edit or paint mode in another scene, which undo and loading end."""
+    """Whether hair waits for the end of an edit or paint mode in another scene, which undo and loading end, or follows
+    guides on a surface that no scene shows together with the hair.
+    """
     there = bpy.context.view_layer.objects
-    return any(
-        one.vellus.is_stale
-        and one.surface is not None
-        and one.surface.mode != "OBJECT"
-        and one.surface.name not in there
-        for one in ours()
+    stale = [one for one in ours() if one.vellus.is_stale and one.surface is not None]
+    return any(one.surface.mode != "OBJECT" and one.surface.name not in there for one in stale) or any(
+        {*curve_data.grown_on(one).users_scene}.isdisjoint(one.surface.users_scene) for one in stale
     )
 
 

@@ -8,10 +8,10 @@ from ..settings import animated
 
 
 def follow(blender_scenes):
-    """Update names and references of hair, and how some scenes draw it."""
+    """Update names and references of hair, and how some scenes draw it. Returns Curves that were copied."""
     thin_hair.follow(blender_scenes)
     followed_names.follow()
-    copied_hair.follow()
+    return copied_hair.follow()
 
 
 def accept_state():

@@ -57,7 +57,7 @@ def after_depsgraph_update(scene, depsgraph):
     if not scene_time.is_shown(depsgraph):
         return
     global _is_opening, _is_undone
-    file_changes.follow([scene])
+    copies = file_changes.follow([scene])
     is_seen = viewport.is_up_to_date()
     events.scene_changed(_is_hair_only(reports), _is_light_only(reports))
     if any(report.is_of(bpy.types.Scene) for report in reports):
@@ -100,13 +100,17 @@ def after_depsgraph_update(scene, depsgraph):
     reported.remember_places()
     if _is_undone:
         _is_undone = False
-        simulated_hair.follow_undo(scene, depsgraph)
+        simulated_hair.show_known(frame_folders.simulating(), scene, depsgraph)
         for datablock in _of_kind("HAIR"):
             if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
             # The undo step may have been saved before painted looks were written.
             if strand_maps.has_looks(datablock.vellus):
                 datablock.vellus.is_shading_stale = True
+    elif copies:
+        simulated_hair.show_known(
+            [guides for guides in frame_folders.simulating() if guides in copies], scene, depsgraph
+        )
     if any(report.is_of(bpy.types.Image, bpy.types.World) for report in reports):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
@@ -432,7 +436,8 @@ def after_load(*_args):
     _hide_drawn_hair()
     composite.follow_all()  # a file does not store that linked hair is hidden from other engines
     if bpy.app.background and any(frame_folders.simulating()):
-        simulated_hair.follow_undo(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+        blender_scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+        simulated_hair.show_known(frame_folders.simulating(), blender_scene, depsgraph)
 
 
 def _hide_drawn_hair():

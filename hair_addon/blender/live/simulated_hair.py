@@ -111,9 +111,9 @@ def note_combed(combed, blender_scene):
                 guides.vellus.dynamics_status = str(error)
 
 
-def follow_undo(blender_scene, depsgraph):
-    """Show simulated guides again after an undo, a redo or a load, which show them as combed."""
-    for guides in frame_folders.simulating():
+def show_known(simulating, blender_scene, depsgraph):
+    """Show simulated guides at their known points after loading, copying, undo or redo, which show them as combed."""
+    for guides in simulating:
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
             _note_state(guides, blender_scene)

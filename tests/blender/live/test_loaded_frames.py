@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A file that is loaded without a window shows its baked frames at once."""
+"""Files that are loaded without a window, and copies, show their baked frames at once."""
 
 import bpy
 import numpy as np
@@ -51,3 +51,21 @@ def test_a_damaged_frame_is_a_status_after_loading(baked, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "baked.blend"))
     guides = bpy.data.objects["Guides"].data
     assert not simulated_guides.is_shown(guides) and "Frame 3" in guides.vellus.dynamics_status
+
+
+def test_baked_frames_of_copies_are_shown_at_once(baked):
+    guides = bpy.data.objects["Guides"].data
+    points = np.empty((len(guides.points), 3), np.float32)
+    guides.attributes["position"].data.foreach_get("vector", points.ravel())
+    guides.attributes["position"].data.foreach_set("vector", (1.1 * points).ravel())
+    guides.update_tag()
+    bpy.context.view_layer.update()
+    shown = hair_cache.strands_on_gpu(baked.data).points
+    bpy.ops.object.select_all(action="DESELECT")
+    for one in (baked.data.surface, *baked.data.surface.children_recursive):
+        one.select_set(True)
+    known = {*bpy.data.hair_curves}
+    bpy.ops.object.duplicate(linked=False)
+    (copy,) = (one for one in {*bpy.data.hair_curves} - known if one.vellus.kind == "HAIR")
+    assert copy.vellus.guide_curves != guides and simulated_guides.is_shown(copy.vellus.guide_curves)
+    np.testing.assert_allclose(hair_cache.strands_on_gpu(copy).points, shown, atol=1e-5)

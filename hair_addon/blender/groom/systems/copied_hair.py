@@ -28,15 +28,18 @@ def remember() -> None:
         known_cache.keep("Curves", uids)
 
 
-def follow() -> None:
-    """Attach Curves that were copied since the last call to the surface of their objects, and to its guides."""
+def follow() -> list[Curves]:
+    """Attach Curves that were copied since the last call to the surface of their objects, and to its guides.
+
+    Returns the copies.
+    """
     known, ours = known_cache.get("Curves"), _ours()
     if (known or frozenset()) == frozenset(datablock.session_uid for datablock in ours):
-        return
+        return []
     remember()
     new = [] if known is None else [datablock for datablock in ours if datablock.session_uid not in known]
     if not new:
-        return
+        return []
     users = _users()
     for datablock in new:
         surface = _surface_beside(datablock, users.get(datablock, ()))
@@ -49,6 +52,7 @@ def follow() -> None:
             guides = _guides_beside(hair, new, users)
             if guides is not None:
                 _let_follow(hair, guides)
+    return new
 
 
 def _ours() -> list[Curves]:
