@@ -213,6 +213,7 @@ OTHERS = {
     *("select_guides", "select_hair", "smooth_guides", "stiffen_dynamics", "toggle_drawing", "trim_guides"),
     *("gather_guides", "paint_flow", "size_flow_brush", "update_hair", "use_points", "use_uv_map"),
     *("save_selection", "select_saved", "remove_selection", "retry_baking"),
+    *("keep_guide_density", "keep_strand_density"),
 }
 CASES = [(name, *case) for name, cases in MAKING.items() for case in cases]
 
