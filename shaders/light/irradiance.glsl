@@ -11,6 +11,7 @@ vec3 pattern_at(Light light, vec3 position)
     return vec3(1.0);
   }
   vec3 along = mat3(light.pattern) * normalize(position - light.position.xyz);
+  along /= max(length(along), 1e-12);  // an uneven scale distorts directions
   vec2 place = vec2(0.5 - atan(along.y, along.x) / (2.0 * PI), 0.5 + asin(clamp(along.z, -1.0, 1.0)) / PI);
   return textureLod(light_patterns, vec3(place, float(light.pattern_layer - 1)), 0.0).rgb * light.pattern[3].rgb;
 }

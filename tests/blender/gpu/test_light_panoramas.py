@@ -72,6 +72,8 @@ LIGHTS = {
     "point, IES": ("POINT", aslant(0.5, 1.0, 1.0), ies),
     "point, IES, scaled": ("POINT", aslant(0.5, 1.0, 1.0, (2.0, 2.0, 2.0)), ies),
     "point, mirrored": ("POINT", aslant(1.0, -1.0, 1.5, (-1.0, 1.0, 1.0)), tinted),
+    "point, unevenly scaled": ("POINT", aslant(1.0, -1.0, 1.5, (3.0, -1.0, 0.5)), tinted),
+    "point, by the world's axes, unevenly scaled": ("POINT", aslant(1.0, -1.0, 1.5, (3.0, 1.0, 0.5)), in_world),
     "spot, tinted": ("SPOT", aslant(-1.0, -1.5, 0.5), tinted),
     "spot, by the world's axes": ("SPOT", aslant(-1.0, -1.5, 0.5), in_world),
     "area, by places": ("AREA", aslant(1.0, 2.0, 2.0), on_area),
@@ -140,13 +142,13 @@ def test_light_of_nodes_arrives_as_in_cycles(scene, tmp_path, monkeypatch, name)
 
     monkeypatch.setattr(world_panoramas, "kept_or_rendered", kept_or_rendered)
     evaluated = lamp.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    place = np.array(lamp.matrix_world)
+    place, is_scaled = np.array(lamp.matrix_world), light_panoramas._is_scaled(evaluated.data)
     assert light_panoramas.find(evaluated.data, place, 1.0, True) is None
     shone = by_cycles(scene, matrix, tmp_path)
     without_nodes(lamp.data)
     shone /= by_cycles(scene, matrix, tmp_path)
     light_panorama.render(tmp_path / "light.blend", "Lamp", options[0], 1.0, False, tmp_path / "light.npz")
-    factor = light_panoramas._read(tmp_path / "light.npz").factor(place, PLACE)
+    factor = light_panoramas._read(tmp_path / "light.npz", is_scaled).factor(place, PLACE)
     np.testing.assert_allclose(factor, shone, rtol=0.02)
 
 

@@ -14,12 +14,13 @@ from .shader_sockets import nodes_of
 
 SIZE = 1024, 512  # pixels of patterns, and of panoramas of spot lights
 WIDE_SIZE = 512, 256  # pixels of panoramas of other lights
+AREA_SIZE = 256, 128  # pixels of panoramas of area lights, which need more samples as each is at another place
 COARSE_SIZE = 64, 32  # pixels of the first panorama in viewports
 _TINY = 1e-4  # least light without nodes that divides, relative to the brightest direction
 _LEAST = 1e-3  # least factor of a lamp's power, relative to its brightest direction
 _BRIGHTEST = 6e4  # greatest value of a pattern, within the range of half floats
 
-picture_cache = Cache(capacity=64)  # path → `Panorama`
+picture_cache = Cache(capacity=64)  # (path, whether scaled) → `Panorama`
 
 # Settings of lights that the panorama depends on, beside the nodes.
 _SETTINGS = ("type", "shadow_soft_size", "spot_size", "spot_blend", "shape", "size", "size_y", "spread", "angle")
@@ -30,11 +31,13 @@ _WORLD_NODES = {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"}  # which depend
 class Panorama:
     """Light in the directions of a lamp's axes, by latitude from below and by longitude.
 
-    lit: (H, W, 3), with nodes; plain: (H, W), without them; in the same unit.
+    lit: (H, W, 3), with nodes; plain: (H, W), without them; in the same unit; is_scaled: whether the lamp's scale
+    distorts the directions, as in Cycles the normals that nodes of points and spots read.
     """
 
     lit: np.ndarray
     plain: np.ndarray
+    is_scaled: bool = False
 
     @cached_property
     def pattern(self):
@@ -50,10 +53,12 @@ class Panorama:
         width, height = SIZE
         return self.pattern.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3))
 
-    @staticmethod
-    def axes(matrix):
-        """Unit axes (3, 3) of a lamp with a matrix (4, 4), one in each column."""
-        return matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+    def axes(self, matrix):
+        """Axes (3, 3) of a lamp with a matrix (4, 4), one in each column, of length one unless its scale distorts
+        directions: then the longest has this length.
+        """
+        lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+        return matrix[:3, :3] / np.maximum(lengths.max() if self.is_scaled else lengths, 1e-12)
 
     def factor(self, matrix, places):
         """Return the mean RGB light that arrives at places (P, 3), divided by the light without nodes.
@@ -73,9 +78,9 @@ class Panorama:
 
     def _arriving(self, matrix, places):
         offsets = np.reshape(places, (-1, 3)) - matrix[:3, 3]
-        axes = self.axes(matrix)
         distances = np.maximum(np.linalg.norm(offsets, axis=1), 1e-6)
-        x, y, z = ((offsets @ axes) / distances[:, None]).T
+        along = offsets @ self.axes(matrix)
+        x, y, z = (along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)).T
         height, width = self.plain.shape
         column = width * (0.5 - np.arctan2(y, x) / (2.0 * np.pi)) - 0.5
         row = np.clip(height * (0.5 + np.arcsin(np.clip(z, -1.0, 1.0)) / np.pi) - 0.5, 0.0, height - 1.0)
@@ -96,17 +101,27 @@ def find(light, matrix, frame, waits):
     """
     if light.node_tree is None or not unread_nodes.labels_of_light(light):
         return None
-    is_placed = any(node.type in _WORLD_NODES for node in nodes_of(light.node_tree))
-    rows = (matrix if is_placed else np.eye(4)).tolist()
+    rows = (matrix if _is_placed(light) else np.eye(4)).tolist()
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
-    found.update(repr((SIZE, WIDE_SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
+    found.update(repr((SIZE, WIDE_SIZE, AREA_SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
     made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
     path = made or picture_jobs.last_of(light)
-    return None if path is None else picture_cache.get(path, lambda: _read(path))
+    is_scaled = _is_scaled(light)
+    return None if path is None else picture_cache.get((path, is_scaled), lambda: _read(path, is_scaled))
 
 
-def _read(path):
+def _is_placed(light):
+    """Whether the panorama of a light depends on its place."""
+    return any(node.type in _WORLD_NODES for node in nodes_of(light.node_tree))
+
+
+def _is_scaled(light):
+    """Whether the scale of a light distorts its panorama."""
+    return light.type in {"POINT", "SPOT"} and not _is_placed(light)
+
+
+def _read(path, is_scaled):
     """Return the `Panorama` of a file; None if it is damaged, and it is rendered again."""
     try:
         with np.load(path) as found:
@@ -114,4 +129,4 @@ def _read(path):
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         path.unlink(missing_ok=True)
         return None
-    return Panorama(lit, plain)
+    return Panorama(lit, plain, is_scaled)

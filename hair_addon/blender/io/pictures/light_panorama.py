@@ -15,6 +15,7 @@ from ...host import scene_time
 from . import world_panorama
 
 SAMPLES = 2  # per pixel
+AREA_SAMPLES = 32  # per pixel, of an area light
 _FAR = 1000.0  # radius of the sphere that the light shines on [m], and in sizes of the light
 _MARGIN = 0.02  # additional part of the latitudes
 _ENERGY = 1e6  # of the light, for pixels of about one
@@ -53,8 +54,12 @@ def render(path, name, matrix, frame, is_coarse, out):
     camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
     size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
     camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
-    pixels = light_panoramas.SIZE if light.type == "SPOT" else light_panoramas.WIDE_SIZE
-    world_panorama.set_up(scene, SAMPLES, light_panoramas.COARSE_SIZE if is_coarse else pixels)
+    is_area = light.type == "AREA"
+    pixels = {"SPOT": light_panoramas.SIZE, "AREA": light_panoramas.AREA_SIZE}.get(
+        light.type, light_panoramas.WIDE_SIZE
+    )
+    pixels = light_panoramas.COARSE_SIZE if is_coarse else pixels
+    world_panorama.set_up(scene, AREA_SAMPLES if is_area else SAMPLES, pixels)
     scene.cycles.max_bounces = 0
     # The light shines into the lower latitudes. The others stay black.
     scene.render.use_border, scene.render.use_crop_to_border = True, False

@@ -111,6 +111,7 @@ def _pattern(sources: Sources, chosen: int, direction: wp.vec3):
         x = wp.dot(direction, sources.pattern_axes[chosen, 0])
         y = wp.dot(direction, sources.pattern_axes[chosen, 1])
         z = wp.dot(direction, sources.pattern_axes[chosen, 2])
+        z /= wp.max(wp.sqrt(x * x + y * y + z * z), 1e-12)  # an uneven scale distorts directions
         width = sources.patterns.shape[1]
         u = 0.5 - wp.atan2(y, x) / (2.0 * PI)
         v = 0.5 + wp.asin(wp.clamp(z, -1.0, 1.0)) / PI

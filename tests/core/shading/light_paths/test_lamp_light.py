@@ -61,14 +61,15 @@ def light_on_a_strand(light, path_count=20_000, patterns=None):
 
 
 def test_a_pattern_scales_light_in_its_directions():
-    """A pattern of two halves along an axis of the lamp scales light by its value toward the strand."""
+    """A pattern around an axis of the lamp scales light by its value toward the strand."""
     plain = light_on_a_strand(lamp(lamps.POINT, 5.0, 0.01, 300.0), 4_000)
     pattern = np.zeros((1, 32, 64, 3), np.float32)
-    pattern[0, 16:] = 2.0, 1.0, 0.5  # directions along the z axis
+    pattern[0, 28:] = 2.0, 1.0, 0.5  # directions along the z axis
     for sign, factor in ((1.0, [1.0, 0.5, 0.25]), (-1.0, [0.0, 0.0, 0.0])):
         turned = lamp(lamps.POINT, 5.0, 0.01, 300.0)
         turned["pattern_layer"] = 1
-        turned["pattern"][0, :3, :3] = np.transpose([[1, 0, 0], [0, 0, 1], [0, sign, 0]])  # z toward the strand
+        axes = [[1, 0, 0], [0, 0, 1], [0, sign, 0]]  # z toward the strand
+        turned["pattern"][0, :3, :3] = 0.01 * np.transpose(axes)  # their length has no effect
         turned["pattern"][0, 3, :3] = 0.5
         np.testing.assert_allclose(light_on_a_strand(turned, 4_000, pattern), np.multiply(factor, plain), rtol=1e-3)
     turned["pattern_layer"] = 2
