@@ -59,7 +59,7 @@ PANELS = {
     "systems": ("systems",),
     "surface": ("surface", "surface_uvs"),
     "guides": ("guides", "guides_growth", "guides_placement"),
-    "strands": ("interpolation", "interpolation_parting", "interpolation_advanced"),
+    "strands": ("interpolation", "interpolation_parting"),  # the sidebar has no room for interpolation_advanced
     "dynamics": ("dynamics", "dynamics_material", "dynamics_forces", "dynamics_shape"),
     "styles": ("styles", "styles_profile", "styles_mask"),
     "shading": ("shading", "shading_color", "shading_fibre", "shading_variation"),
@@ -307,7 +307,7 @@ class Window:
 
     def show_panels(self, names):
         """Show only these panels of the tab, opened; None: all panels."""
-        pictured = {f"VELLUS_PT_{name}" for shown in PANELS.values() for name in shown}
+        pictured = {f"VELLUS_PT_{name}" for shown in (("layers",), *PANELS.values()) for name in shown}
         # A panel whose parent is missing would be at the top of the tab.
         panels = [p for p in self.blender.panels.CLASSES if {p.bl_idname, getattr(p, "bl_parent_id", "")} & pictured]
         for panel in reversed(panels):
