@@ -62,33 +62,34 @@ def making_cards(hair, settings, folder=None):
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
     strands = CardStrands(read.points, read.radii, read.colors(), read.surface)
-    comparison = of_trials = None
+    levels = settings.levels(len(read.points))
+    comparison = trials = None
     if settings.error_measure != "OFF":
         comparison = yield lambda progress: Comparison(strands, progress)
     if settings.error_measure == "MINIMIZED":
-        of_trials = yield lambda progress: Comparison(strands, progress, best_placement.SAMPLES)
-    levels = settings.levels(len(read.points))
+        most = levels[0].card_count
+        trials = yield lambda progress: best_placement.Trials(strands, comparison, most, progress)
     areas = np.cumsum([0] + [level.texture_size**2 for level in levels])
     parts = (areas / areas[-1]).tolist()
     drawn = []
     for index, level in enumerate(levels):
-        drawn.append((yield from _drawing(strands, comparison, of_trials, level, settings, parts[index : index + 2])))
+        drawn.append((yield from _drawing(strands, comparison, trials, level, settings, parts[index : index + 2])))
     joints = yield lambda _progress: read.joints(settings)
     return _written(read, drawn, joints, folder, settings.texture_layout)
 
 
-def _drawing(strands, comparison, of_trials, level, settings, parts):
+def _drawing(strands, comparison, trials, level, settings, parts):
     """Draw a level, as work in steps.
 
-    comparison, of_trials: comparisons with the strands for the error and for trials, or None; parts: the first and last
+    comparison, trials: comparisons with the strands for the error and for trials, or None; parts: the first and last
     part of the total progress.
     """
     first, last = parts
     middle = first + 0.1 * (last - first)
     choice = settings, Placement()
-    if of_trials is not None:
+    if trials is not None:
         choice = yield lambda progress: best_placement.best_placement(
-            of_trials, strands, level, settings, part_of(progress, first, middle)
+            trials, level, settings, part_of(progress, first, middle)
         )
     laid = yield lambda progress: laid_cards(strands, level, *choice, part_of(progress, first, middle))
     placed = laid.strands

@@ -9,7 +9,7 @@ import numpy as np
 from ..imaging.flip import flip
 from ..long_work import Progress, no_progress
 from .card_layout import CardStrands
-from .card_views import PIXELS, SAMPLES, Sides, View
+from .card_views import PIXELS, SAMPLES, SIDES, Sides, View
 from .polygon_mesh import PolygonMesh
 from .texels import srgb
 
@@ -45,13 +45,22 @@ class CardShares:
 
 
 class Comparison:
-    """Views of strands for comparison with cards; samples: number along each side of a view, a multiple of 128."""
+    """Views of strands for comparison with cards.
 
-    def __init__(self, strands: CardStrands, progress: Progress = no_progress, samples: int = SAMPLES) -> None:
-        self._sides = Sides(strands.points, strands.surface, samples)
+    samples: number along each side of a view, a multiple of 128; sides: (N, 3, 3) as in `Sides`.
+    """
+
+    def __init__(
+        self,
+        strands: CardStrands,
+        progress: Progress = no_progress,
+        samples: int = SAMPLES,
+        sides: np.ndarray = SIDES,
+    ) -> None:
+        self._sides = Sides(strands.points, strands.surface, samples, sides)
         self._views = []
         for view in self._sides.of_strands(strands.points, strands.radii, strands.colors):
-            progress("Comparing cards with strands", len(self._views) / 6.0)
+            progress("Comparing cards with strands", len(self._views) / len(sides))
             self._views.append(view)
 
     def error_of(self, mesh: PolygonMesh, maps: dict[str, np.ndarray]) -> CardError:

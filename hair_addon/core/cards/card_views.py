@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of strands and of textured cards from six sides, in light from the viewer, for comparison."""
+"""Pictures of strands and of textured cards from several sides, in light from the viewer, for comparison."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _MARGIN = 1.05  # size of a view, relative to the hair
 _AMBIENT = 0.3  # part of the light that comes from all directions
 _AT_ONCE = 400_000  # segments of strands in a batch
 # Unit vectors to the right, upward and toward the viewer.
-_SIDES = np.array(
+SIDES = np.array(
     [
         [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
         [[-1, 0, 0], [0, 0, 1], [0, 1, 0]],
@@ -27,6 +27,14 @@ _SIDES = np.array(
     ],
     float,
 )
+
+
+def side_toward(viewer: tuple[float, float, float]) -> np.ndarray:
+    """Return the rows (3, 3) of a side: unit vectors to the right, upward and toward the viewer, who is not above."""
+    toward = np.array(viewer) / np.linalg.norm(viewer)
+    right = np.cross([0.0, 0.0, 1.0], toward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(toward, right), toward])
 
 
 @dataclass(frozen=True)
@@ -48,21 +56,22 @@ class View:
 
 
 class Sides:
-    """The six sides from which hair is seen, with a surface that hides hair behind it.
+    """The sides from which hair is seen, with a surface that hides hair behind it.
 
-    points: (S, P, 3) of the hair, finite; surface: `TriMesh` in the same space; samples: along each side of a view.
+    points: (S, P, 3) of the hair, finite; surface: `TriMesh` in the same space; samples: along each side of a view;
+    sides: (N, 3, 3) unit vectors to the right, upward and toward the viewer.
     """
 
-    def __init__(self, points: np.ndarray, surface: TriMesh, samples: int = SAMPLES) -> None:
+    def __init__(self, points: np.ndarray, surface: TriMesh, samples: int = SAMPLES, sides: np.ndarray = SIDES) -> None:
         low, high = points.min(axis=(0, 1)).astype(float), points.max(axis=(0, 1)).astype(float)
         self._middle, self._width = 0.5 * (low + high), max(_MARGIN * float((high - low).max()), 1e-12)
-        self._samples = samples
+        self._samples, self._sides = samples, sides
         self._surface = surface.vertices[surface.triangles]
 
     def of_strands(self, points: np.ndarray, radii: np.ndarray, colors: np.ndarray) -> Iterator[View]:
         """Yield the `View` of strands (S, P, 3) from each side; radii: (S, P); colors: (S, P, 3) linear."""
         pieces = points.shape[1] - 1
-        for axes in _SIDES:
+        for axes in self._sides:
             samples = Samples(self._samples)
             step = max(_AT_ONCE // pieces, 1)
             for first in range(0, len(points), step):
@@ -83,7 +92,7 @@ class Sides:
         corners = mesh.vertices[quads][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3).astype(float)
         uvs = mesh.uvs.reshape(-1, 4, 2)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 2)
         frames = _tangent_frames(corners, uvs)
-        for axes in _SIDES:
+        for axes in self._sides:
             samples = Samples(self._samples)
             placed = self._placed(corners, axes)
             samples.add(placed, uvs, maps["alpha"])

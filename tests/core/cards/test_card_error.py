@@ -2,22 +2,24 @@
 """The error of cards is 0 for the strands themselves, falls with the number of cards, and decides placements."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import best_placement, card_views
-from hair_addon.core.cards.card_error import CardShares, Comparison, card_error
+from hair_addon.core.cards import best_placement, card_views, strand_sample
+from hair_addon.core.cards.card_error import CardError, CardShares, Comparison, card_error
 from hair_addon.core.cards.card_exchange import exchanged
 from hair_addon.core.cards.card_layout import CardStrands, Clumps, Placement, clumps_of
 from hair_addon.core.cards.card_settings import CardSettings, Level
 from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.geometry.search.clusters import strand_features
 from hair_addon.core.long_work import no_progress
 from tests.core.cards.conftest import sphere, wavy_hair
 from tests.support.pairs import share_of_rows
 
 SAMPLES = 128  # fewer than the default take less time
-LEVEL = Level(40, 6, 256)
+LEVEL, SMALL = Level(40, 6, 256), Level(20, 6, 128)
 
 
 @pytest.fixture(scope="module")
@@ -88,30 +90,100 @@ def test_crossed_cards_have_less_error_than_as_many_single_cards(comparison, str
     assert error(comparison, strands, 40, crossed=1.0).coverage < 0.8 * error(comparison, strands, 40).coverage
 
 
+@pytest.fixture
+def trials(comparison, strands, monkeypatch):
+    """Return the `Trials` of a sample of 100 of 400 strands, for up to 20 cards."""
+    monkeypatch.setattr(best_placement, "SAMPLES", SAMPLES)
+    monkeypatch.setattr(strand_sample, "MOST_STRANDS", 100)
+    monkeypatch.setattr(strand_sample, "MOST_POINTS", 7)
+    return best_placement.Trials(strands, comparison, 20)
+
+
+def minimized(trials, progress=no_progress, **changes):
+    """Return (chosen, default) pairs of settings and placement of 20 cards."""
+    settings = CardSettings(card_count=20, **changes)
+    return best_placement.best_placement(trials, SMALL, settings, progress), (settings, Placement())
+
+
 @pytest.mark.long
-def test_the_chosen_placement_has_the_least_error_of_its_trials(comparison, strands, monkeypatch):
-    """The best placement has at most the error of every trial, for the same number of cards."""
-    monkeypatch.setattr(best_placement, "_TIP", ())
-    monkeypatch.setattr(best_placement, "_OUTWARD", (0.5,))
-    tried = []
+@pytest.mark.parametrize("crossed", [0.0, 0.25])
+def test_a_chosen_placement_of_a_sample_has_less_error_of_all_strands(trials, crossed, monkeypatch):
+    """From the sides of the search and from others, with as many cards and the given part of crossed cards."""
+    monkeypatch.setattr(best_placement, "MOST_EXCHANGES", 5)
+    best, default = minimized(trials, crossed=crossed)
+    found, most = (trials.errors_of_all(SMALL, *choice) for choice in (best, default))
+    assert (found <= most).all() and (crossed or found[0] < 0.95 * most[0])
+    assert best[1].clumps is None or best[1].clumps.count + len(best[1].clumps.crossed) == 20
+    assert crossed in {0.0, best[0].crossed}
 
-    def measured(*given):
-        tried.append((given[3:], measure(*given)))
-        return tried[-1][1]
 
-    measure = best_placement.placement_error
-    monkeypatch.setattr(best_placement, "placement_error", measured)
-    settings = CardSettings(card_count=40)
-    best = best_placement.best_placement(comparison, strands, LEVEL, settings, no_progress)
-    least = min(tried, key=lambda trial: trial[1].mean)
-    found = measure(comparison, strands, LEVEL, *best).mean
-    assert best[0] == least[0][0] and found <= least[1].mean < 0.9 * tried[0][1].mean
-    assert best[1].clumps.count + len(best[1].clumps.crossed) == 40
-    assert tried[0][0] == (settings, Placement()) and len(tried) == 4
-    tried.clear()
-    given = CardSettings(card_count=40, crossed=0.25)
-    best = best_placement.best_placement(comparison, strands, LEVEL, given, no_progress)
-    assert best[0] == given and len(tried) == 2  # the settings determine the crossed cards
+def test_the_number_of_trials_and_their_strands_is_bounded(trials, monkeypatch):
+    """Also if each trial has less error than all before, and the result is no better for all strands."""
+    drawn, levels = [], iter(np.linspace(0.9, 0.1, 99))
+    shares = CardShares(*np.random.default_rng(0).random((2, 20)))
+
+    def measured(*_given):
+        return CardError(0.0, next(levels))
+
+    monkeypatch.setattr(best_placement, "_drawn", lambda its, *_given: drawn.append(len(its.points)) or (its, {}))
+    monkeypatch.setattr(trials.seen, "error_of", measured)
+    monkeypatch.setattr(trials.held, "error_of", measured)
+    monkeypatch.setattr(trials.seen, "shares_of", lambda *_given: (measured(), shares))
+    monkeypatch.setattr(trials, "_of_all", [SimpleNamespace(error_of=lambda *_drawn: CardError(0.0, len(drawn)))])
+    steps = []
+    best, default = minimized(trials, lambda step, part: steps.append((part, step)))
+    assert best == default
+    assert steps == sorted(steps) and steps[0][0] == 0.0 and 0.9 < steps[-1][0] < 1.0
+    assert drawn.count(400) == 3 and drawn.count(100) == len(drawn) - 3 <= 19
+
+
+def test_a_placement_that_is_worse_from_other_sides_is_not_used(trials, monkeypatch):
+    """Crossed cards seem best for the sample. They are used if neither error of all strands is larger."""
+    placement, errors = Placement(tip=4.0), {0.0: [0.2, 0.2], 1.0: [0.1, 0.3]}
+    monkeypatch.setattr(best_placement, "_exchanging", lambda *_given: placement)
+    monkeypatch.setattr(trials, "errors_of_all", lambda _level, its, _placement: np.array(errors[its.crossed]))
+    monkeypatch.setattr(best_placement, "placement_error", lambda *given: CardError(0.0, 1.0 - given[3].crossed))
+    best, default = minimized(trials)
+    assert best == default
+    errors[1.0] = [0.1, 0.2]
+    assert minimized(trials)[0] == (replace(default[0], crossed=1.0), placement)
+
+
+def test_exchanges_that_seem_worse_from_other_sides_are_not_accepted(trials, monkeypatch):
+    falling, rising = iter(np.linspace(0.9, 0.1, 20)), iter(np.linspace(0.1, 0.9, 20))
+    shares = CardShares(*np.random.default_rng(0).random((2, 20)))
+    monkeypatch.setattr(best_placement, "_drawn", lambda *_given: (None, None))
+    monkeypatch.setattr(trials.seen, "shares_of", lambda *_given: (CardError(0.0, next(falling)), shares))
+    monkeypatch.setattr(trials.held, "error_of", lambda *_drawn: CardError(0.0, next(rising)))
+    assert best_placement._exchanging(trials, SMALL, CardSettings(), Placement(), lambda _index: None) is None
+    assert next(rising) > 0.2  # several were tried
+
+
+def test_a_sample_covers_as_much_as_all_strands(strands, monkeypatch):
+    monkeypatch.setattr(strand_sample, "MOST_STRANDS", 100)
+    sample = strand_sample.sample_of(strands, 10)
+    assert len(sample.rows) == 100 and (np.diff(sample.rows) > 0).all()
+    everywhere, some = (np.linalg.norm(np.diff(its.points, axis=1), axis=-1) for its in (strands, sample.strands))
+    areas = [(length * its.radii[:, 1:]).sum() for length, its in ((everywhere, strands), (some, sample.strands))]
+    assert areas[1] == pytest.approx(areas[0], rel=0.05)
+    assert len(strand_sample.sample_of(strands, 50).rows) == 200  # four for each card
+    assert len(strand_sample.sample_of(strands, 400).rows) == 400
+
+
+def test_clumps_of_a_sample_become_clumps_of_all_strands(strands, monkeypatch):
+    """Sampled strands keep their clump, flyaways keep their number, and other strands join the most similar clump."""
+    monkeypatch.setattr(strand_sample, "MOST_STRANDS", 100)
+    sample = strand_sample.sample_of(strands, 10)
+    clumps = clumps_of(sample.strands, LEVEL, CardSettings(crossed=0.3, flyaways=0.2), Placement())
+    found = strand_sample.of_all(Placement(clumps=clumps), strands, sample.rows).clumps
+    np.testing.assert_array_equal(found.labels[sample.rows], clumps.labels)
+    assert (found.labels < 0).sum() == (clumps.labels < 0).sum() == 8
+    features, chosen = strand_features(strands.points), sample.rows[clumps.labels >= 0]
+    kept = found.labels[chosen]
+    middles = np.array([features[chosen[kept == clump]].mean(axis=0) for clump in range(clumps.count)])
+    rest = np.setdiff1d(np.arange(400), sample.rows)
+    apart = ((features[rest, None] - middles) ** 2).sum(axis=-1)
+    np.testing.assert_array_equal(found.labels[rest], apart.argmin(axis=1))
 
 
 def test_shares_of_cards_add_up_to_the_samples_that_are_seen(comparison, strands):

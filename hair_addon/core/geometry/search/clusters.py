@@ -50,6 +50,12 @@ def medoids(features: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
     return order[np.searchsorted(labels[order], np.arange(count))]
 
 
+def nearest(features: np.ndarray, middles: np.ndarray) -> np.ndarray:
+    """Return the index (N,) int32 of the closest of middles (K, D) to each of features (N, D)."""
+    origin = middles.mean(axis=0)
+    return _nearest((features - origin).astype(np.float32), middles - origin, no_progress)[0]
+
+
 def _boxes(features, count):
     """Return labels by recursive division along the widest extent, in proportion to the clusters of each part."""
     labels, parts, first = np.empty(len(features), np.int32), [(np.arange(len(features)), count)], 0
