@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         ribbon_charts,
         ribbons,
         spring_colliders,
+        strand_sample,
         texels,
         texture_layouts,
         tubes,
