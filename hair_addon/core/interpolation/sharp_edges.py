@@ -38,7 +38,7 @@ def go_around(
 ) -> None:
     """Lengthen paths (S, K) [m] to candidate guides (S, K) on other faces, and sort both.
 
-    normals (S,) and guide_normals (G,): unit; the last path of a row is not lengthened.
+    normals (S,) and guide_normals (G,): unit; the last path of a row stays as it is.
     """
     require_count("candidates", candidates.size, ways.size)
     require_indices("guides", np.maximum(candidates.numpy(), 0), len(guide_normals))
@@ -71,12 +71,13 @@ def _go_around(
     if count == 0 or facing >= wp.static(_BEGIN_COSINE):
         return
     reach = ways[count - 1]
-    for slot in range(count):
+    # The last path stays last: beside part lines it is shorter than some others, and not the length to its guide.
+    for slot in range(count - 1):
         guide = candidates[slot]
         part = (wp.static(_BEGIN_COSINE) - wp.dot(normal, guide_normals[guide])) * wp.static(_PER_COSINE)
         part = wp.clamp(part, 0.0, 1.0)
         part = part * part * (3.0 - 2.0 * part)
-        way = ways[slot] + wp.static(HOLD) * part * (reach - ways[slot])
+        way = ways[slot] + wp.static(HOLD) * part * wp.max(reach - ways[slot], 0.0)
         # Insertion sort: paths are mostly in order, and ties stay in the order of the search.
         place = int(slot)
         while place > 0 and ways[place - 1] > way:

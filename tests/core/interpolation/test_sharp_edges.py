@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+from hair_addon.core.interpolation import sharp_edges
 from tests.support.devices import DEVICE
 from tests.support.strands.finding import find_guides, strands_between
 
@@ -65,3 +66,19 @@ def test_weights_change_without_a_step_around_an_edge(guide_count):
         np.put_along_axis(full, indices, weights, axis=1)  # index -1: the last column, unused
         steepest[every] = np.abs(np.diff(full[:, :-1], axis=0)).sum(axis=1).max() / every
     assert steepest[1] < 1.5 * steepest[10]
+
+
+def test_last_paths_stay_last_also_where_part_lines_make_other_paths_longer(rng):
+    """Beside a part line the last path limits the weights, and is no path to the last guide."""
+    normals = unit(rng.normal(size=(60, 3)))
+    guide_normals = unit(rng.normal(size=(30, 3)))
+    candidates = rng.permuted(np.tile(np.arange(30), (60, 1)), axis=1)[:, :9].astype(np.int32)
+    ways = np.sort(rng.uniform(0.1, 1.0, (60, 9)).astype(np.float32), axis=1)
+    ways[:, -1] *= np.float32(0.6)
+    found, lengths = wp.array(candidates, device=DEVICE), wp.array(ways, device=DEVICE)
+    frames = [wp.array(np.float32(array), dtype=wp.vec3, device=DEVICE) for array in (normals, guide_normals)]
+    sharp_edges.go_around(*frames, found, lengths)
+    after, after_lengths = found.numpy(), lengths.numpy()
+    assert np.array_equal(after[:, -1], candidates[:, -1]) and np.array_equal(after_lengths[:, -1], ways[:, -1])
+    assert (np.diff(after_lengths[:, :-1], axis=1) >= 0.0).all() and (after_lengths >= ways).all()
+    assert np.array_equal(np.sort(after, axis=1), np.sort(candidates, axis=1))
