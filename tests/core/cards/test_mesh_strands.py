@@ -153,6 +153,7 @@ def test_strands_that_fill_a_tube_have_its_outline(has_fans):
     mesh = triangulated(
         tubes.tubes(straight, np.full((1, 9), 0.01), TubeSettings(tube_count=0, side_count=12, point_count=9))
     )
+    plain = made(mesh, strand_count=40, fills=True)
     if has_fans:
         is_cap = np.ptp(mesh.vertices[mesh.triangles][:, :, 2], axis=1) < 1e-6
         middles = np.float32([straight[0, 0], straight[0, -1]])
@@ -165,6 +166,7 @@ def test_strands_that_fill_a_tube_have_its_outline(has_fans):
             np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.triangles[~is_cap], *fans]).astype(np.int32)
         )
     found = made(mesh, strand_count=40, fills=True)
+    np.testing.assert_allclose(found.points, plain.points, atol=1e-6)  # of the same rings
     for row in (found.starts[:-1], found.starts[1:] - 1):
         assert np.ptp(found.points[row, 2]) < 1e-6
     at_ends = found.points[[0, found.starts[1] - 1], 2]

@@ -118,6 +118,16 @@ def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
     assert np.linalg.norm(beyond - along[:, None] * ahead, axis=1).max() < 0.015
 
 
+def test_tails_of_rows_narrow_to_a_second_tie_and_end_in_a_tuft(ball, guides):
+    """Guides of a row come close to each other at the second tie near the end, and closer still at the tip."""
+    longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
+    after, groups, _held = gathered(ball, longer, ROWS, SETTINGS)
+    own = after[groups <= 3].astype(np.float64)
+    widths = np.linalg.norm(own - own.mean(axis=0), axis=2).max(axis=0)
+    assert widths[-2] < 0.5 * SETTINGS.tie_radius and widths[-1] < 0.2 * SETTINGS.tie_radius
+    assert widths[8:-4].min() > 0.5 * SETTINGS.tie_radius
+
+
 def test_guides_that_are_too_short_for_a_row_do_not_shorten_its_tail(ball, guides):
     """Short guides are held up to their ends, as at other ties."""
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
