@@ -16,6 +16,9 @@ from tests.support.exchange.imported import curves_object, select
 
 GUIDES, STRANDS = 8, 24
 
+# Lasts as long as the process, which Blender's temporary folder need not.
+_FOLDER = tempfile.TemporaryDirectory(prefix="vellus_grown_")
+
 
 def files_in(folder, add=lambda _body: None):
     """Return a function from a name in `PLACES` to the path of a file with hair on such a surface, saved once.
@@ -43,7 +46,7 @@ def _grown(place):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.preferences.edit.use_global_undo = True
     grow(place)
-    path = str(Path(tempfile.mkdtemp(dir=bpy.app.tempdir)) / "grown.blend")
+    path = str(Path(tempfile.mkdtemp(dir=_FOLDER.name)) / "grown.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
     return path
 
