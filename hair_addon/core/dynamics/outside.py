@@ -79,7 +79,8 @@ class Barrier:
         """Return strands (S, P, 3) [m] moved out of the obstacles, with the results of `moved_outside`.
 
         held: (S,) number of points from the root that do not move, at least 1; None for the root alone; known_as: (S,)
-        unique indices of strands, which identify them in later calls: these take less time for the same result.
+        unique indices of strands, which identify them in later calls: these take less time for the same result, except
+        between close sheets of an open mesh, where the side of the nearest face changes without a crossing.
         Raises `HairError` for non-finite points.
         """
         points = np.asarray(points, np.float64)
