@@ -40,6 +40,7 @@ def go_around(
 
     normals (S,) and guide_normals (G,): unit; the last path of a row stays as it is.
     """
+    require_count("strands", len(candidates), len(normals))
     require_count("candidates", candidates.size, ways.size)
     require_indices("guides", np.maximum(candidates.numpy(), 0), len(guide_normals))
     parallel.launch(

@@ -67,13 +67,21 @@ def test_a_redraw_bakes_one_table_and_others_follow(lit, baked):
     assert not len(late_layers.request_cache)
 
 
-def test_a_slider_bakes_one_table_for_each_value_and_stops_for_former_ones(lit, baked):
-    look = lit.data.vellus.appearance
+def test_a_slider_bakes_one_table_for_each_value_and_stops_for_former_ones(lit, baked, monkeypatch):
+    look, is_released, real = lit.data.vellus.appearance, threading.Event(), look_tables.bake
+
+    def bake(*given):
+        """Bake in the background only after the slider has all its values, on processors of any speed."""
+        assert _thread() == "redraw" or is_released.wait(60.0)
+        return real(*given)
+
+    monkeypatch.setattr(look_tables, "bake", bake)
     for roughness in (0.2, 0.25, 0.3, 0.35):
         look.roughness = roughness
         bpy.context.view_layer.update()
         shown(lit)
     assert baked.count("redraw") == 4
+    is_released.set()
     settle()
     assert shown(lit).is_radial
     # Each thread ends after the layer that it bakes.
