@@ -13,6 +13,7 @@ from ...core.geometry.strands import Strands
 from ...core.grooming import cost, groom, groom_defaults
 from ...core.grooming.groom import GuideSettings
 from ...core.long_work import Progress, part_of
+from ..data.strands import drawn_lines
 from ..data.surfaces import Surface
 from ..settings import preferences
 from ..settings.translations import error_text
@@ -50,13 +51,14 @@ def grow(
     surface: Surface,
     settings: GuideSettings,
     mask: tuple[np.ndarray | None, Texture | None],
-    flow: np.ndarray | None,
+    flow: drawn_lines.Flow,
     progress: Progress,
     roots: SurfacePoints | None = None,
     varied: VariedGuides | None = None,
 ) -> GrownGuides:
-    """Return the `GrownGuides` of completed settings; mask: (density, texture), flow and roots as in
-    `groom.distribute_guides`; varied: by maps. Guides that cannot be draped keep their grown shape. Raises `HairError`.
+    """Return the `GrownGuides` of completed settings; mask: (density, texture) and roots as in
+    `groom.distribute_guides`; flow: at rest; varied: by maps. Guides that cannot be draped keep their grown shape.
+    Raises `HairError`.
     """
     status = "" if varied is None else varied.status
     if varied is not None and not varied.maps:
@@ -71,7 +73,8 @@ def grow(
         mirror=surface.mirror,
         shape=surface.shape,
         roots=roots,
-        flow=flow,
+        flow=flow.lines,
+        lines=flow.parting,
         drawn_on=surface.drawn_on,
         varied=None if varied is None else varied.values,
         device=device,

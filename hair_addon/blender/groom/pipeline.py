@@ -75,18 +75,18 @@ def distributing_guides(
     settings, key = sized.settings, sized.root_key
     hair_memory.require_guides(settings, len(surface.mesh.triangles))
     roots = reused_roots.of(target, surface, key, settings.guide_count) if keeps_roots else None
-    flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
-    flow_key = drawn_lines.key(surface_object, settings.flow_lines, depsgraph)
+    part_names = drawn_lines.part_names_around(target)
+    flow = drawn_lines.read_flow(surface_object, surface, settings.flow_lines, part_names, depsgraph)
     varied = varied_guides.read(target, surface_object, surface, settings)
     place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
     shown = scene.shown_surface(surface_object, surface)
 
     def compute(progress):
-        laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
+        laid_flow = flow.at_rest(shown, surface, device)
         return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots, varied)
 
     grown = yield compute
-    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow_key, sized.fits)
+    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow.key, sized.fits)
 
 
 def interpolate_hair(
@@ -220,8 +220,8 @@ def adding_hair(
     guide_bytes = hair_memory.guide_bytes(guide_settings, len(surface.mesh.triangles))
     hair_memory.require_strands(hair_settings, other_bytes=guide_bytes)
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
-    flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
-    flow_key = drawn_lines.key(surface_object, guide_settings.flow_lines, depsgraph)
+    part_names = drawn_lines.existing({hair_settings.part_lines})
+    flow = drawn_lines.read_flow(surface_object, surface, guide_settings.flow_lines, part_names, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
     shown = scene.shown_surface(surface_object, surface)
@@ -229,7 +229,7 @@ def adding_hair(
     def compute(progress):
         groom.load_kernels(device, progress)
         inputs = _placement_inputs(surface, shown, hair_mask, parting, device)
-        laid_flow = drawn_lines.at_rest(flow, shown, surface, device)
+        laid_flow = flow.at_rest(shown, surface, device)
         grown = grown_guides.grow(surface, guide_settings, mask, laid_flow, part_of(progress, 0.0, 0.5))
         guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
@@ -240,7 +240,7 @@ def adding_hair(
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
-    keys = of_guides.root_key, flow_key, of_guides.fits
+    keys = of_guides.root_key, flow.key, of_guides.fits
     guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, *keys)
     return guide_curves, write_between(guide_curves, bound)
 

@@ -101,11 +101,12 @@ def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
 
 
 def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
-    """Whether the flow lines of guides have changed since they were grown. Raises `HairError`."""
+    """Whether flow lines of guides, or part lines that divide them, have changed since growth. Raises `HairError`."""
     name = text_of(guides.vellus.guides, "flow_lines")
     if not name or guides.surface is None:
         return False
-    return drawn_lines.key(guides.surface, name, depsgraph) != guides.vellus.flow_key
+    part_names = drawn_lines.part_names_around(guides)
+    return drawn_lines.flow_key(guides.surface, name, part_names, depsgraph) != guides.vellus.flow_key
 
 
 def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:

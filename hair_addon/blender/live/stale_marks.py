@@ -137,11 +137,18 @@ def follow_partings(changed, transformed, depsgraph):
 
 
 def follow_flow(changed, transformed, depsgraph):
-    """Mark guides as stale if their flow lines have moved on the surface; arguments as for `follow_partings`."""
+    """Mark guides as stale if their flow lines have moved on the surface, or the part lines that divide the flow.
+
+    Part lines do not concern combed guides. Arguments as for `follow_partings`.
+    """
     for guides in bpy.data.hair_curves:
         state = guides.vellus
         lines = text_of(state.guides, "flow_lines")
-        if state.kind != "GUIDES" or not drawn_lines.have_moved(lines, guides.surface, changed, transformed):
+        if state.kind != "GUIDES" or not lines:
+            continue
+        if not drawn_lines.have_moved(lines, guides.surface, changed, transformed) and not (
+            _is_parted_anew(guides, changed, transformed) and not curves.is_combed(guides)
+        ):
             continue
         if not state.is_live:
             state.is_stale = True
@@ -149,6 +156,15 @@ def follow_flow(changed, transformed, depsgraph):
         with _refusal_as_status(guides):
             if staleness.has_other_flow(guides, depsgraph):
                 state.is_stale = True
+
+
+def _is_parted_anew(guides, changed, transformed):
+    """Whether hair of guides with flow lines may have other part lines."""
+    return any(
+        hair.vellus.is_stale
+        or drawn_lines.have_moved(text_of(hair.vellus.hair, "part_lines"), guides.surface, changed, transformed)
+        for hair in curves.followers(guides)
+    )
 
 
 def _parts_by(hair, changed, transformed):

@@ -264,6 +264,7 @@ def distribute_guides(
     shape: TriMesh | None = None,
     roots: SurfacePoints | None = None,
     flow: np.ndarray | None = None,
+    lines: np.ndarray | None = None,
     drawn_on: np.ndarray | None = None,
     varied: Callable[[SurfacePoints], Mapping[str, np.ndarray]] | None = None,
     device: str = "cpu",
@@ -275,10 +276,10 @@ def distribute_guides(
     density: (V,) of vertices, at least 0, None for uniform; texture: `Texture` that is multiplied with it, or None;
     mirror: for symmetric guides; shape: `TriMesh` of which `mesh` is a rotated and uniformly scaled copy, mirrored
     across the X axis: guides are placed on it, and thus in the same places for any rotation and scale, None for `mesh`;
-    roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines, and
-    drawn_on (V, 3): as lines and drawn_on of `bind_hair`; varied: returns {setting: (G,)} for guides at roots (G),
-    in place of settings in `VARIED`, or None; progress(step, part): callback, may raise to cancel. Raises
-    `HairError`.
+    roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines,
+    lines: of part lines, across which guides do not follow flow lines, and drawn_on (V, 3): as lines and drawn_on of
+    `bind_hair`; varied: returns {setting: (G,)} for guides at roots (G), in place of settings in `VARIED`, or None;
+    progress(step, part): callback, may raise to cancel. Raises `HairError`.
     """
     check_mesh(mesh)
     load_kernels(device, part_of(progress, 0.0, 0.1))
@@ -304,11 +305,15 @@ def distribute_guides(
     progress("Growing guides", 0.9)
     values: dict[str, Any] = {name: groom_defaults.known(getattr(settings, name)) for name in VARIED}
     values |= {} if varied is None else varied(roots)
+    laid_flow = None
+    if flow is not None:
+        parting = laid_lines(mesh, lines, drawn_on, device)
+        laid_flow = grooming.flow_lines.lay(mesh, flow, device, drawn_on, parting)
     controls = grooming.guide_growth.grow(
         mesh,
         roots,
         length_variation=settings.length_variation,
-        flow=None if flow is None else grooming.flow_lines.lay(mesh, flow, device, drawn_on),
+        flow=laid_flow,
         is_draped=settings.drape,
         seed=settings.seed,
         control_point_count=CONTROL_POINT_COUNT,

@@ -248,3 +248,53 @@ def test_missing_flow_lines_are_reported_with_the_surface(plane):
     assert 'No object "Flow"' in reported() and "flow lines" in reported()
     guides.data.vellus.guides.flow_lines = ""
     assert "flow lines" not in reported()
+
+
+def parted_plane():
+    """Return guides between opposite flow lines at x = ±0.5, with hair, and a curve "Parting" along the y axis."""
+    for name, lines in (("Flow", [((-0.5, -1), (-0.5, 1)), ((0.5, 1), (0.5, -1))]), ("Parting", [((0, -1), (0, 1))])):
+        data = bpy.data.meshes.new(name)
+        places = [(*place, 0.0) for line in lines for place in line]
+        data.from_pydata(places, [(i, i + 1) for i in range(0, len(places), 2)], [])
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, data))
+    bpy.context.view_layer.update()
+    guides = grow(flow_lines="Flow", lift=0.0)
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.interpolate_hair(strand_count=100)
+    return guides
+
+
+def sides(guides):
+    """Return the largest difference of guides from the flow of their side."""
+    own = np.sign(-points(guides)[:, 0, 0])[:, None] * (0.0, 1.0, 0.0)
+    return np.abs(directions(guides) - own).max()
+
+
+def test_part_lines_of_the_hair_divide_the_flow_of_its_guides(plane):
+    guides = parted_plane()
+    hair = bpy.data.objects["Hair"].data.vellus.hair
+    plain = points(guides)
+    assert sides(guides) > 0.5
+    hair.part_lines = "Parting"
+    bpy.context.view_layer.update()
+    assert sides(guides) < 0.06  # guides that lie flat rise a little
+    drawn = bpy.data.objects["Parting"]
+    drawn.location.x = 0.6
+    bpy.context.view_layer.update()
+    moved = points(guides)
+    assert sides(guides) > 0.5 and np.abs(moved - plain).max() > 0.05
+    hair.part_lines = ""
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(guides), plain)
+
+
+def test_part_lines_leave_combed_guides(plane):
+    guides = parted_plane()
+    combed = points(guides)
+    combed[:, 1:] += (0.0, 0.0, 0.05)
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+    bpy.data.objects["Hair"].data.vellus.hair.part_lines = "Parting"
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(guides), combed)
+    assert not guides.data.vellus.is_stale and guides.data.vellus.status == ""

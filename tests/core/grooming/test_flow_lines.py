@@ -11,6 +11,7 @@ from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.grooming import flow_lines, groom, guide_growth
 from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.interpolation import part_lines
 from tests.support.devices import DEVICE
 from tests.support.meshes import flat_grid
 
@@ -196,3 +197,52 @@ def test_distances_equal_those_to_many_points_of_the_pieces(rng):
     there = starts + part * (ends - starts)
     brute = np.stack([np.linalg.norm(there - place, axis=2).min(axis=0) for place in places])
     np.testing.assert_allclose(flow_lines._distances(places, starts, ends), brute, atol=1e-5)
+
+
+OPPOSITE = np.concatenate([line((0.3, 0.1), (0.3, 0.9)), line((0.7, 0.9), (0.7, 0.1))])
+
+
+def parted(mesh, places, segments, parting, lift=0.5):
+    """Return the directions (G, 3) of guides at places on a plane with part lines."""
+    lines = flow_lines.lay(mesh, segments, DEVICE, parting=part_lines.lay(mesh, parting, DEVICE))
+    return flow_lines.axes(lines, places, np.broadcast_to(UP, places.shape), lift)
+
+
+@pytest.mark.parametrize("frame", [(1.0, 1.0), (-1.0, 1.0), (0.01, 0.01), (100.0, -100.0), (0.7, 1.2)])
+def test_guides_follow_the_flow_of_their_own_side_of_a_part_line(plane, roots, frame):
+    """Up to a part line between opposite lines, the angle to the lines of a guide's own side is zero."""
+    scale = np.array([*frame, frame[0] if frame[0] > 0.0 else 1.0])
+    triangles = plane.triangles if frame[0] * frame[1] > 0.0 else plane.triangles[:, ::-1]
+    mesh = TriMesh((plane.vertices * scale).astype(np.float32), np.ascontiguousarray(triangles))
+    x = np.concatenate([0.5 - np.geomspace(1e-4, 0.3, 20), 0.5 + np.geomspace(1e-4, 0.3, 20)])
+    for parting, y in ((line((0.5, 0.0), (0.5, 1.0)), (0.05, 0.5, 0.95)), (line((0.5, 0.1), (0.5, 0.9)), (0.4, 0.5))):
+        places = np.array([(each, height, 0.0) for each in x for height in y]) * scale
+        found = parted(mesh, places, OPPOSITE * scale, parting * scale, 0.0)
+        sides = np.sign(0.5 - places[:, 0] / scale[0]) * np.sign(scale[1])
+        assert np.abs(found - sides[:, None] * (0.0, 1.0, 0.0)).max() < 1e-5
+    whole = axes(mesh, places, OPPOSITE * scale, 0.0)
+    assert np.abs(whole[:, 1]).min() < 0.1  # without a part line they cancel
+
+
+def test_the_flow_of_both_sides_blends_beyond_an_open_end_of_a_part_line(plane):
+    """Along a path around the end of a part line, directions turn without a step."""
+    angles = np.linspace(-1.0, 1.0, 1001)[:, None] * np.pi
+    for radius in (0.02, 0.1, 0.2):
+        places = np.concatenate([0.5 + radius * np.sin(angles), 0.5 + radius * np.cos(angles), 0.0 * angles], axis=1)
+        found = parted(plane, places[1:-1], OPPOSITE, line((0.5, 0.0), (0.5, 0.5)))
+        assert np.linalg.norm(np.diff(found, axis=0), axis=1).max() < 0.1
+        assert np.abs(found[[0, -1], 1]).min() > (0.8 if radius > 0.1 else 0.0)
+
+
+def test_behind_a_part_line_without_lines_guides_grow_as_without_flow(plane):
+    places, parting = along()[along()[:, 1] > 0.5], line((0.0, 0.5), (1.0, 0.5))
+    for segments in (line((0.1, 0.4), (0.9, 0.4)), line((0.5, 0.4), (0.51, 0.4))):  # many pieces, and one
+        np.testing.assert_array_equal(parted(plane, places, segments, parting), [UP] * len(places))
+
+
+def test_part_lines_far_from_the_flow_change_nothing(plane):
+    segments = line((0.1, 0.2), (0.4, 0.25), (0.9, 0.2))
+    places = along()[along()[:, 1] < 0.5]
+    np.testing.assert_array_equal(
+        parted(plane, places, segments, line((0.1, 0.9), (0.9, 0.9))), axes(plane, places, segments)
+    )

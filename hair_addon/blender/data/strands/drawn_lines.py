@@ -2,15 +2,63 @@
 """Lines that are drawn on a surface, part lines and flow lines: curve objects → segments."""
 
 import hashlib
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ....core import interpolation
 from ....core.errors import HairError
+from ...host.notices import text_of
+from . import curves
 from .curves import curve_offsets
 
 _POINT_LIMIT = 10_000  # as each strand reads all segments
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Flow lines, and the part lines that divide them: (L, 2, 3) float64 segments [m] in a `Surface`'s coordinates.
+
+    None without lines; part lines are None without flow lines. key: as of `flow_key`.
+    """
+
+    lines: np.ndarray | None
+    parting: np.ndarray | None
+    key: str
+
+    def at_rest(self, shown, surface, device):
+        """Move lines from the shown `Surface` to the surface at rest, as `at_rest` does."""
+        lines, parting = (at_rest(each, shown, surface, device) for each in (self.lines, self.parting))
+        return Flow(lines, parting, self.key)
+
+
+def read_flow(surface_object, surface, name, part_names, depsgraph):
+    """Return the `Flow` of a curve object, divided by the part lines of other objects. Raises `HairError`."""
+    lines = read(surface_object, surface, name, depsgraph)
+    parts = [] if lines is None else [read(surface_object, surface, each, depsgraph) for each in part_names]
+    parts = [part for part in parts if part is not None]
+    key = flow_key(surface_object, name, part_names, depsgraph)
+    return Flow(lines, np.concatenate(parts) if parts else None, key)
+
+
+def flow_key(surface_object, name, part_names, depsgraph):
+    """Return the `key` of flow lines, with that of the part lines that divide them. Raises `HairError`."""
+    own = key(surface_object, name, depsgraph)
+    return "-".join([own, *(key(surface_object, each, depsgraph) for each in part_names)]) if own else ""
+
+
+def part_names_around(guide_curves):
+    """Return the names of the part lines of all hair that follows some guides (or None), without missing objects."""
+    if guide_curves is None:
+        return []
+    generated = (hair for hair in curves.followers(guide_curves) if not curves.is_hand_made(hair))
+    return existing({text_of(hair.vellus.hair, "part_lines") for hair in generated})
+
+
+def existing(names):
+    """Return the sorted names of objects that exist."""
+    return sorted(name for name in names if name and name in bpy.data.objects)
 
 
 def read(surface_object, surface, name, depsgraph):

@@ -149,9 +149,10 @@ def _grown_base(guides, depsgraph):
     settings = replace(settings, guide_density=0.0)  # the roots are known
     mask = masks.own(settings).read(guides.surface, surface, depsgraph)
     settings = size_fitting.of_guides(settings, surface, mask, guides).settings
-    flow = drawn_lines.read(guides.surface, surface, settings.flow_lines, depsgraph)
+    part_names = drawn_lines.part_names_around(guides)
+    flow = drawn_lines.read_flow(guides.surface, surface, settings.flow_lines, part_names, depsgraph)
     shown = scene.shown_surface(guides.surface, surface)
-    laid_flow = drawn_lines.at_rest(flow, shown, surface, preferences.device())
+    laid_flow = flow.at_rest(shown, surface, preferences.device())
     starts, local = curves.curve_offsets(guides), curves.read_points(guides)
     roots = curves.read_roots(guides, surface, surface.from_local(local[starts[:-1]]))
     settings = replace(settings, guide_count=len(roots))
