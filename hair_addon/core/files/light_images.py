@@ -30,9 +30,10 @@ def read_layers(path: str | Path) -> dict[str, np.ndarray]:
     return layers
 
 
-def write_colors(path: str | Path, colors: np.ndarray) -> None:
+def write_colors(path: str | Path, colors: np.ndarray, is_compressed: bool = True) -> None:
     """Write (H, W, 3) scene-linear colors, bottom row first, as float32. Raises `OSError`."""
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    compression = OpenEXR.ZIP_COMPRESSION if is_compressed else OpenEXR.NO_COMPRESSION
+    header = {"compression": compression, "type": OpenEXR.scanlineimage}
     pixels = np.ascontiguousarray(colors[::-1], np.float32)
     try:
         OpenEXR.File(header, {"RGB": pixels}).write(str(path))

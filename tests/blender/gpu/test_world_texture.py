@@ -181,7 +181,7 @@ def test_the_sun_of_a_sky_has_all_its_light(scene, tmp_path, monkeypatch):
     name = scene.world.name
 
     def light(is_coarse):
-        world_panorama.render(tmp_path / "sky.blend", name, 1.0, is_coarse, tmp_path / "sky.exr")
+        world_panorama.render(tmp_path / "sky.blend", name, "sky", 1.0, is_coarse, tmp_path / "sky.exr")
         colors = light_images.read_layers(tmp_path / "sky.exr")[""].astype(float)
         widths = np.cos(np.pi * ((np.arange(len(colors)) + 0.5) / len(colors) - 0.5))
         return np.einsum("h,hwc->c", widths, colors) / len(colors) ** 2
@@ -192,6 +192,28 @@ def test_the_sun_of_a_sky_has_all_its_light(scene, tmp_path, monkeypatch):
     exact = light(False)
     np.testing.assert_allclose(fine, exact, rtol=0.01)
     np.testing.assert_allclose(coarse, exact, rtol=0.01)
+
+
+@pytest.mark.farm
+def test_a_panorama_is_of_its_own_nodes_and_frame(tmp_path, monkeypatch):
+    """A fine picture reuses the scene of the coarse one before it, but not that of other nodes or of another frame."""
+    monkeypatch.setattr(world_panorama, "SIZE", (8, 4))
+    world = bpy.data.worlds.new("Sky")
+    strength = world.node_tree.nodes["Background"].inputs["Strength"]
+    strength.keyframe_insert("default_value", frame=2.0)
+    bpy.data.libraries.write(str(tmp_path / "2.blend"), {world})
+    strength.default_value = 3.0
+    strength.keyframe_insert("default_value", frame=3.0)
+    bpy.data.libraries.write(str(tmp_path / "3.blend"), {world})
+
+    def light(file, frame, is_coarse):
+        world_panorama.render(tmp_path / f"{file}.blend", "Sky", file, frame, is_coarse, tmp_path / "sky.exr")
+        return float(light_images.read_layers(tmp_path / "sky.exr")[""].mean())
+
+    one = light("2", 3.0, True)
+    np.testing.assert_allclose(light("2", 3.0, False), one, rtol=1e-6)
+    jobs = [("3", 3.0, True), ("3", 2.0, True), ("3", 2.0, False), ("3", 3.0, False), ("2", 3.0, True)]
+    np.testing.assert_allclose([light(*job) for job in jobs], np.multiply([3.0, 1.0, 1.0, 3.0, 1.0], one), rtol=1e-6)
 
 
 @pytest.mark.farm

@@ -12,8 +12,9 @@ def file_of(world, frame, waits):
 
     waits: return only once it is there. Raises `HairError` if it cannot be rendered.
     """
-    path = kept_files.folder("worlds") / f"{world_digest.digest_of(world)}.exr"
-    return kept_or_rendered("world", world, path, waits, frame=float(frame))
+    digest = world_digest.digest_of(world)
+    path = kept_files.folder("worlds") / f"{digest}.exr"
+    return kept_or_rendered("world", world, path, waits, digest=digest, frame=float(frame))
 
 
 def kept_or_rendered(kind, owner, path, waits, **values):

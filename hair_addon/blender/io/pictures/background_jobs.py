@@ -57,9 +57,9 @@ def _run(folder):
         os.replace(part, folder / background_process.ENDED)
 
 
-def _world(folder, sources, frame, is_coarse):
+def _world(folder, sources, digest, frame, is_coarse):
     ((library, name),) = sources
-    world_panorama.render(library or folder / BLEND, name, frame, is_coarse, folder / "0.exr")
+    world_panorama.render(library or folder / BLEND, name, digest, frame, is_coarse, folder / "0.exr")
 
 
 def _light(folder, sources, frame, is_coarse, matrix):

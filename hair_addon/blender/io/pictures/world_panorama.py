@@ -19,21 +19,48 @@ SAMPLES = 4  # per pixel
 SUN_SAMPLES = 256  # per pixel around the sun of a Sky Texture, whose disk covers two pixels
 _AROUND_SUN = 3  # pixels
 
+_NODES = "vellus_nodes"  # property of a scene: digest of the nodes of its world, and the frame
+
 # Values of the Light Path node for light that hair scatters.
 _LIGHT_PATH = {"Is Camera Ray": 0.0, "Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0}
 
 
-def render(path, name, frame, is_coarse, out):
+def render(path, name, digest, frame, is_coarse, out):
     """Render a world of a .blend at a frame into an .exr. Raises `HairError`.
 
-    The picture is the radiance from all directions, in the projection of the Environment Texture node. is_coarse:
-    render a picture of fewer pixels or samples in less time.
+    The picture is the radiance from all directions, in the projection of the Environment Texture node. digest: of the
+    world's nodes, as the name may be that of another world in the next job; is_coarse: render a picture of fewer pixels
+    or samples in less time.
+    """
+    out = Path(out)
+    scene = bpy.context.scene
+    if scene.get(_NODES) != [digest, str(frame)]:
+        scene = _opened(path, name, digest, frame, out.parent)
+    sun = _size_of_sun(scene.world.node_tree)
+    # Few samples of large pixels would miss the sun.
+    set_up(scene, 1 if is_coarse else SAMPLES, COARSE_SIZE if is_coarse and sun is None else SIZE)
+    part = out.with_suffix(".part.exr")
+    colors = picture(scene, part)
+    if sun is not None:
+        _render_sun(scene, colors, sun, part)
+    if not is_coarse:
+        scene.render.use_persistent_data = False  # frees the memory of Cycles
+        del scene[_NODES]
+    light_images.write_colors(part, colors, is_compressed=not is_coarse)
+    os.replace(part, out)
+
+
+def _opened(path, name, digest, frame, folder):
+    """Return a new scene with a world of a .blend at a frame, and a camera of all directions.
+
+    Cycles keeps the data of the world for the next picture of the same scene. The table of a Sky Texture takes most of
+    the time of a coarse picture.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         with bpy.data.libraries.load(str(path)) as (_found, wanted):
             wanted.worlds = [name]
-        unsaved_images.restore(Path(out).parent)
+        unsaved_images.restore(folder)
         scene = bpy.context.scene
         (scene.world,) = filter(None, wanted.worlds)
         scene.render.engine = "CYCLES"
@@ -42,17 +69,10 @@ def render(path, name, frame, is_coarse, out):
     replace_light_paths(scene.world.node_tree, set())
     scene.world.cycles.sampling_method = "NONE"  # the importance map would take most of the time
     add_camera(scene)
-    sun = _size_of_sun(scene.world.node_tree)
-    # Few samples of large pixels would miss the sun.
-    set_up(scene, 1 if is_coarse else SAMPLES, COARSE_SIZE if is_coarse and sun is None else SIZE)
     scene_time.go_to_time(scene, frame)
-    out = Path(out)
-    part = out.with_suffix(".part.exr")
-    colors = picture(scene, part)
-    if sun is not None:
-        _render_sun(scene, colors, sun, part)
-    light_images.write_colors(part, colors)
-    os.replace(part, out)
+    scene.render.use_persistent_data = True
+    scene[_NODES] = [digest, str(frame)]
+    return scene
 
 
 def picture(scene, path):
@@ -71,13 +91,11 @@ def _render_sun(scene, colors, sun, part):
     across = min(math.ceil(reach / max(math.cos(latitude), 1e-3)), width)
     rows = max(row - reach, 0), min(row + reach + 1, height)
     columns = max(column - across, 0), min(column + across + 1, width)
-    scene.render.use_border = True
-    scene.render.use_crop_to_border = False
+    scene.render.use_border = scene.render.use_crop_to_border = True
     scene.render.border_min_x, scene.render.border_max_x = (edge / width for edge in columns)
     scene.render.border_min_y, scene.render.border_max_y = (edge / height for edge in rows)
     scene.cycles.samples = SUN_SAMPLES
-    around = np.s_[rows[0] : rows[1], columns[0] : columns[1]]
-    colors[around] = picture(scene, part)[around]
+    colors[rows[0] : rows[1], columns[0] : columns[1]] = picture(scene, part)
 
 
 def add_camera(scene):
@@ -104,9 +122,10 @@ def set_up(scene, samples, size):
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.pixel_filter_type = "BOX"  # so that pixels receive all light of the sun
     (render.resolution_x, render.resolution_y), render.resolution_percentage = size, 100
+    render.use_border = False
     render.film_transparent = render.use_motion_blur = render.use_compositing = render.use_sequencer = False
     picture = render.image_settings
-    picture.file_format, picture.color_depth, picture.exr_codec = "OPEN_EXR", "32", "ZIP"
+    picture.file_format, picture.color_depth, picture.exr_codec = "OPEN_EXR", "32", "NONE"
 
 
 def replace_light_paths(tree, known):
