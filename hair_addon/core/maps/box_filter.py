@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from ..geometry.mesh import SurfacePoints, TriMesh
-from ..kernels import parallel
+from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_indices
 from . import uv_islands
 
@@ -134,18 +134,40 @@ class Levels:
         levels[0][rows, columns] = pixels[rows, columns]
         for finer, level in itertools.pairwise(levels):
             rows, columns = (slice(side.start // 2, (side.stop + 1) // 2) for side in (rows, columns))
-            level[rows, columns] = halved(finer[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop])
+            _halve_into(
+                level[rows, columns], finer[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop]
+            )
 
 
 def halved(pixels: np.ndarray) -> np.ndarray:
-    """Return the means of two by two texels of (H, W, C); a last odd row or column stands alone."""
-    height, width = pixels.shape[:2]
-    if height % 2 or width % 2:
-        pixels = np.pad(pixels, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-    # Each texel is divided by four first, because sums of large floats overflow.
-    quarter = np.float32(0.25)
-    rows = quarter * pixels[::2] + quarter * pixels[1::2]
-    return rows[:, ::2] + rows[:, 1::2]
+    """Return the means of two by two texels of (H, W, C) float32; a last odd row or column stands alone."""
+    height, width, channels = pixels.shape
+    found = np.empty(((height + 1) // 2, (width + 1) // 2, channels), np.float32)
+    _halve_into(found, pixels)
+    return found
+
+
+def _halve_into(found, pixels):
+    """Write the means of two by two float32 texels to `found`; both may be parts of larger arrays."""
+    source, target = (wp.array(values, dtype=float, ndim=3, device="cpu", copy=False) for values in (pixels, found))
+    kernel_cache.launch(_halve, dim=found.shape[:2], inputs=[source], outputs=[target], device="cpu")
+
+
+@wp.kernel
+def _halve(
+    finer: wp.array3d[float],
+    # outputs
+    out_means: wp.array3d[float],
+):
+    row, column = wp.tid()
+    below = wp.min(2 * row + 1, finer.shape[0] - 1)
+    right = wp.min(2 * column + 1, finer.shape[1] - 1)
+    for channel in range(finer.shape[2]):
+        # Each texel is divided by four first, because sums of large floats overflow.
+        left = 0.25 * finer[2 * row, 2 * column, channel] + 0.25 * finer[below, 2 * column, channel]
+        out_means[row, column, channel] = left + (
+            0.25 * finer[2 * row, right, channel] + 0.25 * finer[below, right, channel]
+        )
 
 
 def _means(taps, levels):

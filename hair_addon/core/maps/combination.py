@@ -49,10 +49,15 @@ def varied_color(value: tuple, colors: np.ndarray, alpha: np.ndarray, how: Combi
 
     Infinite colors count as 0; NaN, a strand without a map, keeps the value.
     """
-    colors = np.where(np.isinf(colors), 0.0, np.asarray(colors, float))
+    colors = np.asarray(colors, float)
+    is_infinite = np.isinf(colors)
+    if is_infinite.any():
+        colors = np.where(is_infinite, 0.0, colors)
     if how.is_inverted:
         colors = 1.0 - colors
     share = (how.amount * np.asarray(alpha, float))[:, None]
+    if (share == 1.0).all() and np.isfinite(colors).all():
+        return np.clip(colors, details.low, details.high)
     mixed = np.where(share == 1.0, colors, (1.0 - share) * np.asarray(value, float) + share * colors)
     is_known = np.isfinite(colors[:, :1] + colors[:, 1:2] + colors[:, 2:]) & np.isfinite(share)
     return np.clip(np.where(is_known, mixed, np.asarray(value, float)), details.low, details.high)

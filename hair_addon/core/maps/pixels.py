@@ -42,6 +42,21 @@ def colors(
     return _reduced(pixels, 4, is_srgb, has_alpha, is_premultiplied)
 
 
+def convert_box(
+    pixels: np.ndarray,
+    box: tuple[slice, slice],
+    found: np.ndarray,
+    is_srgb: bool,
+    has_alpha: bool,
+    is_premultiplied: bool,
+) -> None:
+    """Convert the texels of a box of (H, W, C) float32 pixels in `found`, an array of `colors` or `masks`.
+
+    Sides of at most `MOST_SIDE`; box: slices of rows and columns.
+    """
+    _convert_into(found[box], pixels[box], is_srgb, has_alpha, is_premultiplied)
+
+
 def changed_box(before: np.ndarray, now: np.ndarray) -> tuple[slice, slice] | None:
     """Return the slices of the rows and columns in which images (H, W, C) float32 differ; None if all bits agree."""
     floats = (np.ascontiguousarray(pixels, np.float32).reshape(len(pixels), -1) for pixels in (before, now))
@@ -119,6 +134,8 @@ def box_of_changed_parts(
 def unpremultiplied(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return colors (S, 3) and alpha (S,) in [0, 1] for means (S, 4) of `colors`; colors without alpha are black."""
     alpha = means[:, 3]
+    if (alpha == 1.0).all():
+        return means[:, :3], alpha
     with np.errstate(divide="ignore", invalid="ignore"):
         found = means[:, :3] / alpha[:, None]
     # A color with full alpha stays bit-identical.
@@ -146,15 +163,17 @@ def _reduced(pixels, channels, *way):
 def _converted(pixels, channels, is_srgb, has_alpha, is_premultiplied):
     """Return premultiplied colors (H, W, 4), or masks (H, W, 1), of pixels (H, W, C)."""
     found = np.empty((*pixels.shape[:2], channels), np.float32)
-    source, target = (
-        wp.array(np.ascontiguousarray(values, np.float32), dtype=float, ndim=3, device="cpu", copy=False)
-        for values in (pixels, found)
-    )
+    _convert_into(found, np.ascontiguousarray(pixels, np.float32), is_srgb, has_alpha, is_premultiplied)
+    return found
+
+
+def _convert_into(found, pixels, is_srgb, has_alpha, is_premultiplied):
+    """Convert float32 pixels (H, W, C) to `found` (H, W, 1 or 4); both may be parts of larger arrays."""
+    source, target = (wp.array(values, dtype=float, ndim=3, device="cpu", copy=False) for values in (pixels, found))
     bytes_ = wp.array(_linear_bytes(), dtype=float, device="cpu", copy=False)
     has_alpha = has_alpha and pixels.shape[2] in (2, 4)
     inputs = [parallel.Rows(source), bytes_, bool(is_srgb), has_alpha, has_alpha and not is_premultiplied]
     parallel.launch(_convert, len(pixels), inputs=inputs, outputs=[target], device="cpu", least_rows=_LEAST_ROWS)
-    return found
 
 
 @wp.kernel

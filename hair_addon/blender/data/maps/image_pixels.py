@@ -143,7 +143,7 @@ def _pixels_of(image, named, is_color, is_painted=False):
     if changed is None:
         return known.pixels
     found = _writable(known)
-    found[changed] = convert(raw[changed], **way)
+    maps.pixels.convert_box(raw, changed, found, **way)
     return converted_cache.keep(key, _Converted(digests, raw, way, found, known.pixels, changed)).pixels
 
 

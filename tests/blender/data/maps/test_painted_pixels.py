@@ -25,6 +25,13 @@ def converted_rows(monkeypatch):
             return _convert(values, *given, **options)
 
         monkeypatch.setattr(pixels, name, counting)
+    convert_box = pixels.convert_box
+
+    def counting_box(values, box, *given, **options):
+        counts.append(box[0].stop - box[0].start)
+        convert_box(values, box, *given, **options)
+
+    monkeypatch.setattr(pixels, "convert_box", counting_box)
     return counts
 
 
