@@ -21,6 +21,7 @@ from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .collision.colliders import Colliders
 from .collision.distance_grid import DistanceGrid, distance_grid, least_distance
+from .collision.free_points import is_free
 from .collision.nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
@@ -38,6 +39,7 @@ _FAR = wp.constant(1e6)  # [m]
 _PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # tolerance of distances [m]
 _UNKNOWN = -1e6  # for points that were not searched yet
+_IS_NON_FINITE = wp.constant(-1)
 _RIM_CELLS = 4  # boxes of rims along the longest side of the box around all rims
 
 _NON_FINITE = "Strands to keep outside need points with finite coordinates."
@@ -84,38 +86,58 @@ class Barrier:
         Raises `HairError` for non-finite points.
         """
         points = np.asarray(points, np.float64)
-        after, is_moved = self.moved_only(points, held, known_as)
-        if not is_moved.any():
-            return points, is_moved
-        corrected = points.copy()
-        corrected[is_moved] = after
-        return corrected, is_moved
-
-    def moved_only(
-        self, points: np.ndarray, held: np.ndarray | None = None, known_as: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return ((M, P, 3) float64 points of moved strands, (S,) bool: whether each strand moved); see `moved`."""
-        if not np.isfinite(points).all():
-            raise HairError(_NON_FINITE)
-        if self._colliders.mesh is None or not points.size:
-            return np.zeros((0, *points.shape[1:])), np.zeros(len(points), bool)
-        device = self._colliders.device
         # Each row is a whole strand: broadcasting over three numbers takes three times as long.
         offsets, origin = np.empty(points.shape, np.float32), np.tile(self._origin, points.shape[1])
         np.subtract(points.reshape(len(points), -1), origin, out=offsets.reshape(len(points), -1), casting="same_kind")
-        original = wp.array(offsets, dtype=wp.vec3, device=device, copy=False)
-        held = np.ones(len(points), np.int32) if held is None else np.asarray(held, np.int32)
-        first_moved = wp.array(np.clip(held, 1, points.shape[1]), dtype=int, device=device)
-        out = wp.empty_like(original)
-        moved = wp.zeros(len(points), dtype=int, device=device)
-        known = self._known_of(known_as, points.shape[1])
-        rows = wp.array(np.zeros(len(points), np.int32) if known_as is None else known_as, dtype=int, device=device)
-        inputs = [Rows(original), Rows(first_moved), Rows(rows), self._surface, self._grid, *self._rim_boxes, known]
-        parallel.launch(_keep_outside, len(points), inputs, [out, moved], device, least_rows=256)
-        is_moved = moved.numpy() != 0
-        before, after = original.numpy()[is_moved], out.numpy()[is_moved]
-        is_same = (after == before).all(axis=2)[..., None]
-        return np.where(is_same, points[is_moved], after + self._origin), is_moved
+        rows, after, is_same = self._moved(offsets, np.eye(3), np.zeros(3), held, known_as)
+        is_moved = np.zeros(len(points), bool)
+        if not len(rows):
+            return points, is_moved
+        is_moved[rows] = True
+        corrected = points.copy()
+        corrected[rows] = np.where(is_same[..., None], points[rows], after)
+        return corrected, is_moved
+
+    def moved_local(
+        self, points: np.ndarray, axes: np.ndarray, held: np.ndarray | None = None, known_as: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the strands that `moved` moves: (M,) indices, (M, P, 3) float64 points [m], (M, P) bool: which stay.
+
+        points: (S, P, 3) float32 in other coordinates; axes: (3, 3) matrix from these to the obstacles' coordinates.
+        The remaining strands cost next to nothing if they are known. Raises `HairError` for non-finite points.
+        """
+        return self._moved(np.ascontiguousarray(points, np.float32), axes, -self._origin, held, known_as)
+
+    def _moved(self, points, axes, shift, held, known_as):
+        """Return as `moved_local`; shift: (3,) [m] from the obstacles' axes to coordinates around the origin."""
+        count, point_count = points.shape[:2]
+        if self._colliders.mesh is None or not points.size:
+            if not np.isfinite(points).all():
+                raise HairError(_NON_FINITE)
+            return np.zeros(0, int), np.zeros((0, point_count, 3)), np.zeros((0, point_count), bool)
+        device = self._colliders.device
+        held = np.ones(count, np.int32) if held is None else np.clip(held, 1, point_count).astype(np.int32)
+        known = self._known_of(known_as, point_count)
+        rows = np.zeros(count, np.int32) if known_as is None else np.asarray(known_as, np.int32)
+        inputs = [
+            Rows(wp.array(points, dtype=wp.vec3, device=device, copy=False)),
+            wp.mat33d(*np.asarray(axes, np.float64).ravel().tolist()),
+            wp.vec3d(*map(float, shift)),
+            *(Rows(wp.array(numbers, dtype=int, device=device, copy=False)) for numbers in (held, rows)),
+            self._surface,
+            self._grid,
+            *self._rim_boxes,
+            known,
+        ]
+        before, out = (parallel.empty_vectors((count, point_count), device) for _ in range(2))
+        found = wp.empty(count, dtype=int, device=device)
+        parallel.launch(_keep_outside, count, inputs, [before, out, found], device, least_rows=256)
+        found = found.numpy()
+        if found.min() == _IS_NON_FINITE:
+            raise HairError(_NON_FINITE)
+        moved = np.flatnonzero(found)
+        before, after = before.numpy()[moved], out.numpy()[moved]
+        return moved, after + self._origin, (after == before).all(axis=2)
 
     def _known_of(self, known_as, point_count):
         """Return (G, P) vec4 of the last searches of points; empty without `known_as`."""
@@ -193,6 +215,8 @@ def _known_at(place: wp.vec3, free: float, gap: float, low: wp.array[wp.vec3], h
 @wp.kernel
 def _keep_outside(
     points: wp.array2d[wp.vec3],
+    axes: wp.mat33d,
+    shift: wp.vec3d,
     first_moved: wp.array[int],
     rows: wp.array[int],
     surface: Surface,
@@ -200,26 +224,37 @@ def _keep_outside(
     rim_low: wp.array[wp.vec3],
     rim_high: wp.array[wp.vec3],
     known: wp.array2d[wp.vec4],  # of rows: a place where each point was outside, and how far it may move from there
-    # outputs
+    # outputs, of which points are only of moved strands
+    out_before: wp.array2d[wp.vec3],
     out_points: wp.array2d[wp.vec3],
     out_moved: wp.array[int],
 ):
     strand = wp.tid()
     row = rows[strand]
-    last = points[strand, 0]
+    out_moved[strand] = 0
+    if known.shape[0] > 0:
+        if is_free(strand, row, first_moved[strand], points, axes, shift, grid, surface.largest_distance, known) == 1:
+            return
+    for i in range(points.shape[1]):
+        place = wp.vec3(axes * wp.vec3d(points[strand, i]) + shift)
+        if not wp.isfinite(place):
+            out_moved[strand] = _IS_NON_FINITE
+            return
+        out_before[strand, i] = place
+    last = out_before[strand, 0]
     out_points[strand, 0] = last
     is_moved = int(0)
     is_sure = int(0)  # whether the last point is outside; unknown behind points that do not move, or are stuck inside
     clear = float(0.0)  # distance that can be traveled before a surface may be near
     for i in range(1, first_moved[strand]):
-        last = points[strand, i]
+        last = out_before[strand, i]
         out_points[strand, i] = last
     for i in range(first_moved[strand], points.shape[1]):
-        before = points[strand, i - 1]
+        before = out_before[strand, i - 1]
         last_but_one = out_points[strand, wp.max(i - 2, 0)]
-        way = points[strand, i] - before
+        way = out_before[strand, i] - before
         size = wp.length(way)
-        place = points[strand, i]
+        place = out_before[strand, i]
         if is_moved == 1:
             place = last + size * wp.normalize(way + _RETURN * (before - last))
         step_size = wp.length(place - last)

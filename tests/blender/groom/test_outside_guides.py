@@ -9,8 +9,8 @@ from mathutils import Matrix
 
 from hair_addon import api
 from hair_addon.blender.data.strands import frozen_points
-from hair_addon.blender.data.surfaces import Surface
 from hair_addon.blender.groom.guides import outside_guides
+from hair_addon.core.dynamics.outside import Barrier
 from tests.support.reading import evaluated_points, points, write_points
 
 
@@ -217,15 +217,15 @@ def test_a_stroke_reads_only_the_guides_that_it_moves(guides, monkeypatch):
     before = comb(guides, points(guides) * np.float32(1.001))  # prepares the surface
     wanted = before.copy()
     wanted[7] = inward(before)[7]
-    counts, real = [], Surface.from_local
+    counts, real = [], Barrier.moved_local
 
-    def counted(surface, places):
-        counts.append(places.size // 3)
-        return real(surface, places)
+    def counted(barrier, shape, *given):
+        counts.append(shape.size // 3)
+        return real(barrier, shape, *given)
 
-    monkeypatch.setattr(Surface, "from_local", counted)
+    monkeypatch.setattr(Barrier, "moved_local", counted)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     after = outside_guides.pushed_out(guides.data, before.reshape(-1, 3), wanted.reshape(-1, 3), depsgraph)
     is_moved = (after.reshape(before.shape) != before).any(axis=(1, 2))
     assert np.flatnonzero(is_moved).tolist() == [7] and depths(after.reshape(before.shape))[7].max() < 1e-6
-    assert sum(counts) <= before.shape[1]
+    assert counts == [before.shape[1]]

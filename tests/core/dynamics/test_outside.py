@@ -98,8 +98,21 @@ def test_segments_keep_their_lengths_in_notches(rng, device):
     np.testing.assert_array_equal(barrier.moved(strands, held)[0][:, :5], strands[:, :5])
 
 
-@pytest.mark.parametrize("is_open", [False, True])
-def test_strands_that_are_known_again_are_moved_alike(rng, is_open):
+_MIRROR = np.diag([-1.0, 1.0, 1.0])
+_TURN = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+
+
+@pytest.mark.parametrize(
+    ("is_open", "axes"),
+    [
+        (False, np.eye(3)),
+        (True, np.eye(3)),
+        (False, 100.0 * _TURN),
+        (False, 0.01 * _MIRROR),
+        (True, np.diag([1.0, 2.0, 0.5]) @ _TURN),
+    ],
+)
+def test_strands_that_are_known_again_are_moved_alike(rng, is_open, axes):
     """Events of a stroke move strands to the same bits, whether points are remembered or all are searched again."""
     mesh = read_obj(HEAD) if is_open else subdivided_sphere(3, 0.1)
     height = mesh.vertices[:, 2]
@@ -110,18 +123,27 @@ def test_strands_that_are_known_again_are_moved_alike(rng, is_open):
     strands = corners.mean(axis=1)[:, None] + np.linspace(0.0, 0.1, 21)[:, None] * outward[:, None]
     obstacle = Obstacle("Scalp", mesh.vertices.astype(np.float64), faces, distance=1e-4)
     searched, known = (Barrier([obstacle], np.zeros(3), strands.size // 3) for _ in range(2))
-    chosen = rng.permutation(200)
+    chosen, held = rng.permutation(200), rng.choice([1, 1, 1, 3, 21], 200)
     moved_count = 0
     for event in range(12):
         way = 0.02 * np.array([np.cos(event), np.sin(event), -0.7]) - 0.02 * outward
         strands = strands + np.linspace(0.0, 1.0, 21)[:, None] * way[:, None] * rng.random((200, 1, 1))
-        wanted, is_moved = searched.moved(strands[chosen])
-        again, is_moved_again = known.moved(strands[chosen], known_as=chosen)
-        np.testing.assert_array_equal(again, wanted)
-        np.testing.assert_array_equal(is_moved_again, is_moved)
-        strands[chosen], moved_count = wanted, moved_count + is_moved.sum()
+        local = (strands[chosen] @ np.linalg.inv(axes).T).astype(np.float32)
+        rows, wanted, is_same = searched.moved_local(local, axes, held[chosen])
+        again = known.moved_local(local, axes, held[chosen], chosen)
+        for one, other in zip(again, (rows, wanted, is_same), strict=True):
+            np.testing.assert_array_equal(one, other)
+        before = local.astype(np.float64) @ axes.T
+        np.testing.assert_allclose(wanted[is_same], before[rows][is_same], atol=1e-7)
+        whole, is_moved = searched.moved(before, held[chosen])
+        np.testing.assert_array_equal(np.flatnonzero(is_moved), rows)
+        np.testing.assert_allclose(whole[rows], wanted, atol=2e-5)  # turns of segments in notches add up rounding
+        strands[chosen], moved_count = whole, moved_count + len(rows)
         chosen = rng.permutation(200)[: 150 + event]
     assert moved_count > 100
+    local[7, 5, 1] = np.inf
+    with pytest.raises(HairError, match="finite"):
+        known.moved_local(local, axes, None, np.arange(len(local)))
 
 
 def test_points_are_not_taken_for_outside_where_points_that_do_not_move_were_inside(rng):

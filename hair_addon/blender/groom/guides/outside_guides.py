@@ -95,21 +95,21 @@ def pushed_out(datablock: Curves, former: np.ndarray, points: np.ndarray, depsgr
 
 def _pushed_at_rest(datablock, barrier, points, starts, changed):
     """Return the result of `pushed_out` on a surface at rest. Only changed guides are read, as strokes must be fast."""
-    counts, local = np.diff(starts), points
-    for count in np.unique(counts[(counts > 1) & (changed > 0.0)]):
-        chosen = np.flatnonzero((counts == count) & (changed > 0.0))
-        places = starts[chosen][:, None] + np.arange(count)
-        are_all = len(places) * count == len(points)  # a copy of all points would take a fifth of the time
-        shape = barrier.surface.from_local(points.reshape(-1, count, 3) if are_all else points[places])
-        if not np.isfinite(shape).all():
-            return points
-        posed, held = np.multiply(shape, barrier.factor, dtype=np.float64), _held(datablock, places)
-        after, is_moved = barrier.barrier.moved_only(posed, held, chosen)
-        after, rows = (after / barrier.factor).astype(np.float32), places[is_moved]
-        moved = (after != shape[is_moved]).any(axis=2)
-        if moved.any():
+    counts, local, are_frozen = np.diff(starts), points, frozen_points.read(datablock)
+    is_chosen = (counts > 1) & (changed > 0.0)
+    for count in np.unique(counts[is_chosen]):
+        chosen = np.flatnonzero((counts == count) & is_chosen)
+        firsts, along = starts[chosen], np.arange(count)
+        are_all = len(chosen) * count == len(points)  # a copy of all points would take a fifth of the time
+        shape = points.reshape(-1, count, 3) if are_all else points[firsts[:, None] + along]
+        held = None if are_frozen is None else _held(are_frozen[firsts[:, None] + along])
+        axes = barrier.factor * barrier.surface.to_world_axes
+        rows, after, is_same = barrier.barrier.moved_local(shape, axes, held, chosen)
+        if not is_same.all():
             local = points.copy() if local is points else local
-            local[rows[moved]] = barrier.surface.to_local(after[moved][:, None])[:, 0]
+            after = (after[~is_same] / barrier.factor).astype(np.float32)
+            places = firsts[rows][:, None] + along
+            local[places[~is_same]] = barrier.surface.to_local(after[:, None])[:, 0]
     return local
 
 
@@ -180,7 +180,8 @@ def _pushed(guides, barrier, chosen, places):
 
 def _pushed_shape(guides, barrier, chosen, places, shape, posed):
     """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3)."""
-    held = _held(guides.datablock, places)
+    are_frozen = frozen_points.read(guides.datablock)
+    held = None if are_frozen is None else _held(are_frozen[places])
     after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held, chosen)
     pushed = shape.copy()
     if is_moved.any():
@@ -192,11 +193,7 @@ def _pushed_shape(guides, barrier, chosen, places, shape, posed):
     return pushed, is_moved
 
 
-def _held(datablock, places):
-    """Return (M,) number of points at the beginning of each guide that are frozen; at least 1."""
-    are_frozen = frozen_points.read(datablock)
-    if are_frozen is None:
-        return None
-    frozen = are_frozen[places]
+def _held(frozen):
+    """Return (M,) number of points from each root that do not move; frozen: (M, P) bool, overwritten."""
     frozen[:, 0] = True
     return np.where(frozen.all(axis=1), frozen.shape[1], np.argmin(frozen, axis=1))
