@@ -8,7 +8,8 @@ length, so that a slow mouse and a fast one have the same effect.
 
 import numpy as np
 
-from .guide_shapes import only, turned, unit
+from ..geometry.transform import turned_about_roots
+from .guide_shapes import turned, unit
 from .guide_tool_settings import FlowSettings
 
 _PACE = 0.5  # length of a stroke with its full effect, relative to the radius
@@ -72,10 +73,9 @@ def turned_along(
     points (S, P, 3) [m]; normals (S, 3) and flow (S, 3): unit, at the roots. Segments keep their lengths; guides
     without share or length, and those without a direction, keep their bits.
     """
-    offsets = np.asarray(points, np.float64) - points[:, :1]
     normals = np.asarray(normals, np.float64)
     flow = unit(flow - np.sum(flow * normals, axis=1, keepdims=True) * normals)
-    lean = unit(offsets[:, -1])
+    lean = unit(np.subtract(points[:, -1], points[:, 0], dtype=np.float64))
     shares = np.where(lean.any(axis=1) & flow.any(axis=1), np.asarray(shares, np.float64), 0.0)
     # Turn about the normal, if the guide leans to a side.
     height = np.clip(np.sum(lean * normals, axis=1), -1.0, 1.0)
@@ -92,8 +92,7 @@ def turned_along(
     reached = turned(lean, aim, shares)
     axis = np.cross(lean, reached)
     down = _rotations(unit(axis), np.arctan2(np.linalg.norm(axis, axis=1), np.sum(lean * reached, axis=1)))
-    rotated = offsets @ (down @ around).transpose(0, 2, 1)
-    return only(points, (points[:, :1] + rotated).astype(np.float32), shares)
+    return turned_about_roots(points, down @ around, shares > 0.0)
 
 
 def _rotations(axes, angles):

@@ -11,11 +11,12 @@ from bpy_extras import view3d_utils
 from mathutils import Matrix, Vector
 
 from hair_addon import api
-from hair_addon.blender.data.strands import frozen_points
+from hair_addon.blender.data.strands import curves, frozen_points
 from hair_addon.blender.groom.guides import flow_painting
 from hair_addon.blender.ui import brush_circle, tools
 from hair_addon.blender.ui.operators.flow_painting import VELLUS_OT_paint_flow, VELLUS_OT_size_flow_brush
 from hair_addon.core.errors import HairError
+from hair_addon.core.grooming.guide_tool_settings import FlowSettings
 from tests.support.interface.layout import draw, redo_panel
 from tests.support.reading import evaluated_points, points
 
@@ -164,6 +165,43 @@ def test_frozen_points_stay_while_others_turn(guides):
     away = distances(before, arc())
     near = (away < 0.5 * RADIUS) & ~frozen.any(axis=1)
     assert near.any() and (after[near] != before[near]).any(axis=(1, 2)).all()
+
+
+@pytest.mark.parametrize("kind", ["plain", "frozen", "counts", "posed", "small and mirrored"])
+def test_events_of_a_stroke_have_the_result_of_the_whole_stroke(guides, kind, monkeypatch):
+    """Each event turns only guides that its piece of the stroke reaches, to the bits of the stroke painted at once."""
+    sphere, scale = bpy.data.objects["Sphere"], 0.01 if kind == "small and mirrored" else 1.0
+    if kind == "frozen":
+        frozen_points.write(guides.data, np.arange(len(guides.data.points)) % 41 < 7)
+    elif kind == "counts":
+        guides.data.resize_curves(sizes=[12, 30], indices=[0, 5])
+    elif kind == "posed":
+        sphere.shape_key_add(name="Basis")
+        for point in sphere.shape_key_add(name="Turned", from_mix=False).data:
+            point.co = Matrix.Rotation(0.5, 3, "Z") @ point.co
+        sphere.data.shape_keys.key_blocks["Turned"].value = 1.0
+    sphere.scale = (-scale, scale, scale) if scale != 1.0 else (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    guides.data.vellus.keeps_outside = True
+    depsgraph, before = bpy.context.evaluated_depsgraph_get(), curves.read_points(guides.data)
+    settings = FlowSettings(radius=0.3 * scale, strength=1.0, mirrored=kind == "plain")
+    counts, real = [], flow_painting.grooming.painted_flow.turned_along
+
+    def counted(points, *given):
+        counts.append(len(points))
+        return real(points, *given)
+
+    monkeypatch.setattr(flow_painting.grooming.painted_flow, "turned_along", counted)
+    stroke = flow_painting.FlowStroke(guides.data, settings, depsgraph)
+    moved_counts = [stroke.extend(piece) for piece in np.split(arc(reach=1.2), 5)]
+    by_events, per_event = curves.read_points(guides.data), sum(counts)
+    stroke.restore()
+    assert np.array_equal(curves.read_points(guides.data), before)
+    counts.clear()
+    at_once = flow_painting.FlowStroke(guides.data, settings, depsgraph)
+    assert at_once.extend(arc(reach=1.2)) == moved_counts[-1] > 5
+    assert np.array_equal(curves.read_points(guides.data), by_events)
+    assert not np.array_equal(by_events, before) and per_event < sum(moved_counts)
 
 
 def test_the_api_paints_as_the_operator_does(guides):

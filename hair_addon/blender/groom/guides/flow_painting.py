@@ -40,6 +40,9 @@ class FlowStroke:
         self._sides = [grooming.painted_flow.PaintedFlow(*values) for _side in range(sides)]
         self._barrier = outside_guides.prepared(guides, 0.0, ()) if datablock.vellus.keeps_outside else None
         self._last = None
+        self._by_count = guide_tools.to_shape(guides)
+        self._shapes = guide_tools.ShapesOfStroke(guides)
+        self._flow = np.zeros((len(guides.counts), 4))  # directions and shares that guides are turned by
 
     def extend(self, stroke: np.ndarray) -> int:
         """Add points (K, 3) in local coordinates of the posed surface to the stroke; returns the number of turned
@@ -73,19 +76,26 @@ class FlowStroke:
         directions, shares = first.directions, first.shares
         if self._settings.mirrored:
             directions, shares = grooming.painted_flow.joined_flow(*self._sides)
-        shares = shares * guides.weights
+        # Guides beyond the reach of the last pieces stay as they are shown.
+        flow = np.column_stack([directions, shares * guides.weights])
+        is_changed = (flow != self._flow).any(axis=1)
         shapes = []
-        for chosen, places in guide_tools.to_shape(guides):
-            is_near = shares[chosen] > 0.0
-            chosen, places = chosen[is_near], places[is_near]
+        for chosen, places in self._by_count:
+            its = is_changed[chosen]
+            chosen, places = chosen[its], places[its]
             if not len(chosen):
                 continue
-            points, normals = guides.points[places], guides.normals[chosen]
-            flow = self._at_rest(directions, chosen)
-            turned = grooming.painted_flow.turned_along(points, normals, flow, shares[chosen], self._settings)
-            turned = turned if barrier is None else outside_guides.pushed(guides, barrier, turned, chosen)
-            shapes.append((places, turned))
-        return guide_tools.write_some(guides, shapes)
+            points, normals = guides.taken(guides.points, chosen, places), guides.normals[chosen]
+            shares = flow[chosen, 3]
+            at_rest = self._at_rest(directions, chosen)
+            turned = grooming.painted_flow.turned_along(points, normals, at_rest, shares, self._settings)
+            near = shares > 0.0
+            if barrier is not None and near.any():
+                turned[near] = outside_guides.pushed(guides, barrier, turned[near], chosen[near])
+            shapes.append((chosen, places, turned))
+        moved_count = self._shapes.write(shapes)
+        self._flow = flow
+        return moved_count
 
     def _at_rest(self, directions, chosen):
         """Return directions (M, 3) at the posed roots of chosen guides, carried to the surface at rest."""

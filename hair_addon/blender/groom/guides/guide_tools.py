@@ -71,6 +71,18 @@ class CombedGuides:
         """Return (M, count) indices of the points of chosen guides (M,) with `count` points each."""
         return self.starts[chosen][:, None] + np.arange(count)
 
+    @cached_property
+    def is_even(self) -> bool:
+        """Whether all guides have the same number of points."""
+        return bool((self.counts == self.counts[0]).all())
+
+    def taken(self, values: np.ndarray, chosen: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return a copy of values (N, 3) of the points of chosen guides, (M, P, 3); places: from `of_count`.
+
+        If all guides have the same number of points, whole guides are copied, in a third of the time.
+        """
+        return values.reshape(len(self.counts), -1, 3)[chosen] if self.is_even else values[places]
+
     def even(self, point_count: int) -> np.ndarray:
         """Return (G, point_count, 3) float32 [m] guides, unchanged if all have that many points, else resampled."""
         if (self.counts == point_count).all():
@@ -207,26 +219,41 @@ def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
     return int(np.count_nonzero(np.add.reduceat(is_moved, guides.starts[:-1])))
 
 
-def write_some(guides: CombedGuides, shapes: Sequence[tuple[np.ndarray, np.ndarray]]) -> int:
-    """Write shapes of some guides, and all other guides as they were read; returns the number changed.
+class ShapesOfStroke:
+    """Shapes of guides while a stroke changes them event by event: only new shapes are compared and converted."""
 
-    shapes: pairs of point indices (M, P) and points (M, P, 3) float32 [m]. Other guides are not compared, because
-    strokes call this at each event. Raises `HairError`.
-    """
-    if frozen_points.read(guides.datablock) is not None:
-        after = guides.points.copy()
-        for places, shape in shapes:
-            after[places] = shape
-        return write_shapes(guides, after)
-    local, moved_count = guides.local.copy(), 0
-    for places, shape in shapes:
-        _require_near(shape)
-        is_moved = (shape != guides.points[places]).any(axis=2)
-        local[places[is_moved]] = guides.surface.to_local(shape[is_moved][:, None])[:, 0]
-        moved_count += int(np.count_nonzero(is_moved.any(axis=1)))
-    attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", local)
-    guides.datablock.update_tag()
-    return moved_count
+    def __init__(self, guides: CombedGuides) -> None:
+        """guides: before the stroke, in whose memory nothing changes."""
+        self._guides = guides
+        self._local = guides.local.copy()
+        self._are_frozen = frozen_points.read(guides.datablock)
+        self._has_moved = np.zeros(len(guides.counts), bool)
+
+    def write(self, shapes: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> int:
+        """Write guides with new shapes; returns the number that differ from before the stroke. Raises `HairError`.
+
+        shapes: (M,) indices of guides, (M, P) indices of their points, and points (M, P, 3) float32 [m]. All other
+        guides, and frozen points, stay as they are.
+        """
+        guides = self._guides
+        for _chosen, _places, shape in shapes:
+            _require_near(shape)
+        for chosen, places, shape in shapes:
+            own, after = guides.taken(guides.points, chosen, places), guides.surface.to_local(shape)
+            is_other = shape != own
+            if self._are_frozen is not None:
+                is_other &= ~self._are_frozen[places][..., None]
+            if self._are_frozen is not None or after is not shape:
+                # Points that stay keep their bits.
+                after = np.where(is_other.any(axis=2)[..., None], after, guides.taken(guides.local, chosen, places))
+            self._has_moved[chosen] = is_other.reshape(len(chosen), -1).any(axis=1)
+            if guides.is_even:
+                self._local.reshape(len(guides.counts), -1, 3)[chosen] = after
+            else:
+                self._local[places] = after
+        attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", self._local)
+        guides.datablock.update_tag()
+        return int(np.count_nonzero(self._has_moved))
 
 
 def _require_near(points):

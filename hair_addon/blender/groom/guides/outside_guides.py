@@ -182,14 +182,13 @@ def _pushed_shape(guides, barrier, chosen, places, shape, posed):
     """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3)."""
     are_frozen = frozen_points.read(guides.datablock)
     held = None if are_frozen is None else _held(are_frozen[places])
-    after, is_moved = barrier.barrier.moved(barrier.factor * posed.astype(np.float64), held, chosen)
-    pushed = shape.copy()
-    if is_moved.any():
-        after = (after[is_moved] / barrier.factor).astype(np.float32)
-        is_same = (after == posed[is_moved]).all(axis=2)
+    rows, after, is_same = barrier.barrier.moved_local(posed, barrier.factor * np.eye(3), held, chosen)
+    pushed, is_moved = shape.copy(), np.zeros(len(shape), bool)
+    if len(rows):
         # Points that stay keep their bits, the root among them.
-        at_rest = guides.carried_back(after, chosen[is_moved])
-        pushed[is_moved] = np.where(is_same[..., None], pushed[is_moved], at_rest)
+        at_rest = guides.carried_back((after / barrier.factor).astype(np.float32), chosen[rows])
+        pushed[rows] = np.where(is_same[..., None], pushed[rows], at_rest)
+        is_moved[rows] = True
     return pushed, is_moved
 
 
