@@ -61,7 +61,7 @@ def making_cards(hair, settings, folder=None):
         require_writable_path(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
-    strands = CardStrands(read.points, read.radii, read.colors(), read.surface)
+    strands = CardStrands(read.points, read.radii, read.colors(), read.surface, read.roughness())
     levels = settings.levels(len(read.points))
     comparison = trials = None
     if settings.error_measure != "OFF":
@@ -95,7 +95,7 @@ def _drawing(strands, comparison, trials, level, settings, parts):
     placed = laid.strands
     yield Stage("Drawing cards", middle)
     picture = card_pictures.CardPicture(placed, level.texture_size)
-    sums = texels.TexelSums(level.texture_size)
+    sums = texels.TexelSums(level.texture_size, placed.roughness is not None)
     for turn in range(card_pictures.PASSES):
         for rows in picture.strips():
             here = turn + rows.start / level.texture_size

@@ -10,7 +10,7 @@ from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.errors import HairError
 from ...core.geometry.mesh import TriMesh
 from ...core.long_work import Stage
-from ...core.shading import strand_colors
+from ...core.shading import appearance, strand_colors
 from ...core.shading.appearance import Appearance
 from ...core.shading.strand_looks import StrandLooks
 from ..data import scene, whole_changes
@@ -47,6 +47,12 @@ class HairBeside:
     def colors(self) -> np.ndarray:
         """Linear RGB (S, P, 3)."""
         return strand_colors.colors(self.look, self.randoms, self.points.shape[1], self.looks)
+
+    def roughness(self) -> np.ndarray | None:
+        """Longitudinal roughness (S,) by a map, without random variation; None if it is that of the look."""
+        if self.looks is None or (self.looks.roughness == 1.0).all():
+            return None
+        return np.clip(appearance.shaded(self.look).roughness * self.looks.roughness, 0.0, 1.0).astype(np.float32)
 
     def local(self, made: PolygonMesh) -> PolygonMesh:
         """Transform a mesh to the surface's local coordinates."""

@@ -16,6 +16,7 @@ light, to represent the layers behind it.
 
 import bpy
 
+from ...core.cards import texture_layouts
 from ...core.shading import appearance
 from ..data.made.made_meshes import UV_MAP
 
@@ -57,6 +58,8 @@ def new_material(name, look, images=None):
             tree.links.new(nodes["color"].outputs["Alpha"], shader.inputs["Alpha"])
             tree.links.new(nodes["bump"].outputs["Normal"], shader.inputs["Normal"])
             tree.links.new(nodes["tangent"].outputs["Tangent"], shader.inputs["Tangent"])
+            if "roughness" in nodes:
+                tree.links.new(nodes["roughness"].outputs["Green"], shader.inputs["Roughness"])
             shader.inputs["Anisotropic"].default_value = _ANISOTROPY
             shader.inputs["Specular IOR Level"].default_value = 0.5 * _SPECULAR
         shaders[-1].inputs["Specular IOR Level"].default_value = 0.5 * _UNSTRETCHED
@@ -71,7 +74,7 @@ def _new_shader(tree, look, color, target, height):
     tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
     look = appearance.shaded(look)
     shader.inputs["Base Color"].default_value = color
-    shader.inputs["Roughness"].default_value = min(max(look.roughness, 0.05) ** 0.5, 1.0)
+    shader.inputs["Roughness"].default_value = float(texture_layouts.surface_roughness(look.roughness))
     shader.inputs["IOR"].default_value = look.ior
     return shader
 
@@ -85,6 +88,10 @@ def _new_images(tree, images):
     for row, kind in enumerate(kind for kind in images if kind not in ("color", "normal")):
         node = tree.nodes.new("ShaderNodeTexImage")
         node.image, node.label, node.location = images[kind], kind, (-1260.0, 160.0 - 320.0 * row)
+        if kind == "roughness":  # where exporters look for it, in the green channel
+            channels = nodes[kind] = tree.nodes.new("ShaderNodeSeparateColor")
+            channels.location = (-900.0, -480.0)
+            tree.links.new(node.outputs["Color"], channels.inputs["Color"])
     for row, kind in enumerate(("color", "normal")):
         node = nodes[kind] = tree.nodes.new("ShaderNodeTexImage")
         node.image, node.location = images[kind], (-900.0, 160.0 - 320.0 * row)

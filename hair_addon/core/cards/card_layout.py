@@ -54,12 +54,16 @@ class Placement:
 
 @dataclass(frozen=True)
 class CardStrands:
-    """Strands that become cards: points (S, P, 3), radii (S, P), linear colors (S, P, 3); surface: in their space."""
+    """Strands that become cards: points (S, P, 3), radii (S, P), linear colors (S, P, 3); surface: in their space.
+
+    roughness: (S,), None if it does not vary.
+    """
 
     points: np.ndarray
     radii: np.ndarray
     colors: np.ndarray
     surface: TriMesh
+    roughness: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,8 @@ def laid_cards(
     heights = float(flat_lines[..., 2].min()), float(flat_lines[..., 2].max())
     ids = np.random.default_rng(0).permutation(len(chosen)) / max(len(chosen) - 1, 1)
     reaches = pieces.reaches[chosen].astype(np.float32)
-    placed = PlacedStrands(flat_lines, flat_radii, shades[chosen], ids.astype(np.float32), heights, reaches)
+    roughness = None if strands.roughness is None else strands.roughness[pieces.strands[chosen]]
+    placed = PlacedStrands(flat_lines, flat_radii, shades[chosen], ids.astype(np.float32), heights, reaches, roughness)
     return Laid(outlines.ribbon_mesh(pieces.axes, found, places.uvs(found), lifted), placed, len(places.shown))
 
 

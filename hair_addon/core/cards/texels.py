@@ -14,7 +14,8 @@ class PlacedStrands:
     """Strands in a texture: places (M, P, 3) from 0 to 1 with heights, radii (M, P), linear colors (M, P, 3), ids (M,).
 
     heights: the lowest and the highest height in the same unit, which have the depths 0 and 1; reaches: (M,) part of
-    each strand's length, from the root, that is in the texture, or None for whole strands.
+    each strand's length, from the root, that is in the texture, or None for whole strands; roughness: (M,), None if it
+    does not vary.
     """
 
     places: np.ndarray
@@ -23,15 +24,16 @@ class PlacedStrands:
     ids: np.ndarray
     heights: tuple[float, float]
     reaches: np.ndarray | None = None
+    roughness: np.ndarray | None = None
 
 
 class TexelSums:
-    """Sums over samples for square textures with `size` texels along a side."""
+    """Sums over samples for square textures with `size` texels along a side; has_roughness: of the strands."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, has_roughness: bool = False) -> None:
         self.size, self._sample_count = size, 0
         self._covered = np.zeros(size * size)
-        self._sums = np.zeros((12, size * size), np.float32)
+        self._sums = np.zeros((12 + has_roughness, size * size), np.float32)
 
     def add(self, segments: np.ndarray, strands: PlacedStrands, per_side: int, shift: np.ndarray, rows: range) -> None:
         """Add a pass of per_side² samples per texel, for some rows of texels.
@@ -54,16 +56,19 @@ class TexelSums:
             sums += np.bincount(texels, weights=value, minlength=len(self._covered))
 
     def maps(self) -> dict[str, np.ndarray]:
-        """Return {map: (size, size) or (size, size, 3) float32} of `MAPS` and "tangent", from 0 to 1.
+        """Return {map: (size, size) or (size, size, 3) float32} of `MAPS`, "tangent" and possibly "roughness", from 0
+        to 1.
 
         The bottom row is the first one. Colors are linear RGB; normals, and tangents from root to tip, are in tangent
         space, mapped from [-1, 1]. Texels without strands are filled from their surroundings.
         """
         side = self.size, self.size
         alpha = (self._covered / self._sample_count).reshape(side).astype(np.float32)
-        means = _filled(self._sums.T.reshape(*side, 12), self._covered.reshape(side).astype(np.float32))
-        normals, tangents = _unit(means[..., 3:6]), _unit(means[..., 9:])
+        means = _filled(self._sums.T.reshape(*side, -1), self._covered.reshape(side).astype(np.float32))
+        normals, tangents = _unit(means[..., 3:6]), _unit(means[..., 9:12])
         shades = {name: means[..., 6 + index].clip(0.0, 1.0) for index, name in enumerate(("depth", "root", "id"))}
+        if means.shape[-1] > 12:
+            shades["roughness"] = means[..., 12].clip(0.0, 1.0)
         directions = {"normal": 0.5 * normals + 0.5, "tangent": 0.5 * tangents + 0.5}
         return {"color": means[..., :3], "alpha": alpha, **directions, **shades}
 
@@ -71,7 +76,8 @@ class TexelSums:
 def _sampled(strands, segments, centres, texel):
     """Return (12, N) color, normal, depth, fraction from root to tip, ID and tangent of samples at centers (N, 2).
 
-    texel: width of a texel. Thinner strands are shaded as flat, because both sides fall into one texel.
+    The roughness, if it varies, is one more row. texel: width of a texel. Thinner strands are shaded as flat, because
+    both sides fall into one texel.
     """
     pieces = strands.places.shape[1] - 1
     strand, piece = np.divmod(segments, pieces)
@@ -92,7 +98,8 @@ def _sampled(strands, segments, centres, texel):
     along = (piece + part) / pieces
     if strands.reaches is not None:
         along = along * strands.reaches[strand]
-    return np.stack([*colors.T, *normals.T, depth, along, strands.ids[strand], *_unit(edge).T])
+    roughness = [] if strands.roughness is None else [strands.roughness[strand]]
+    return np.stack([*colors.T, *normals.T, depth, along, strands.ids[strand], *_unit(edge).T, *roughness])
 
 
 def _unit(vectors):

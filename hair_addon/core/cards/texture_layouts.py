@@ -5,6 +5,7 @@ import numpy as np
 
 from .texels import srgb
 
+_LEAST_ROUGHNESS = 0.05  # of fibers: cards are not mirrors
 PREFIX = "unreal_"  # of the names of packed textures, beside those of `texels.MAPS`
 
 # {layout: {texture: values of its channels}}, with Unreal's names of textures. Unreal reads the UV coordinates of roots
@@ -29,15 +30,21 @@ _CHANNELS = {
 def packed(maps: dict[str, np.ndarray], layout: str, roughness: float) -> dict[str, np.ndarray]:
     """Return {name: (n, n, k)} of the packed textures of a layout of `CardSettings`, with 1, 3 or 4 channels.
 
-    maps: of `TexelSums.maps`; roughness: of the look. Colors are in sRGB, all other values linear, from 0 to 1.
+    maps: of `TexelSums.maps`; roughness: of the look, for maps without roughness. Colors are in sRGB, all other values
+    linear, from 0 to 1.
     """
     size = len(maps["alpha"])
     plain = np.zeros((size, size), np.float32)
-    values = maps | {"color": srgb(maps["color"]), "zero": plain, "roughness": plain + np.float32(roughness)}
+    values = {"roughness": plain + np.float32(roughness)} | maps | {"color": srgb(maps["color"]), "zero": plain}
     return {
         PREFIX + name: np.dstack([values[channel] for channel in channels])
         for name, channels in _CHANNELS[layout].items()
     }
+
+
+def surface_roughness(roughness: np.ndarray | float) -> np.ndarray:
+    """Return the roughness of a surface, as in Principled shaders and glTF, for the roughness of fibers."""
+    return np.clip(np.sqrt(np.maximum(roughness, _LEAST_ROUGHNESS)), 0.0, 1.0)
 
 
 def has_color(name: str) -> bool:

@@ -7,6 +7,8 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.io import mesh_export
+from hair_addon.blender.settings import map_items
+from hair_addon.core.maps.map_settings import MapSettings
 from tests.support.dynamics.following import update
 
 READERS = {".glb": ("import_scene", "gltf"), ".fbx": ("import_scene", "fbx"), ".usdc": ("wm", "usd_import")}
@@ -62,3 +64,39 @@ def test_files_have_faces_coordinates_pictures_and_the_armature(cards, tmp_path,
     assert any("color" in picture for picture in pictures) and any("normal" in picture for picture in pictures)
     assert [one for one in made if one.type == "ARMATURE"]
     assert [group.name for group in found.vertex_groups] == ["head"]
+
+
+def test_files_have_the_roughness_of_strands(hair, tmp_path):
+    """Roughness by a map is in the green channel of a texture, as glTF has it, and in the file."""
+    look = hair.data.vellus.appearance
+    look.roughness = 0.4
+    map_items.keep(hair.data.vellus, MapSettings(setting="look.roughness", kind="STRAND", low=0.25))
+    update()
+    (made,) = api.make_hair_cards(
+        hair, card_count=12, segment_count=3, texture_size=128, texture_layout="UNREAL_COMPACT", folder=tmp_path
+    )
+    texels, packed = (
+        _pixels(bpy.data.images[f"{made.name} {name}"]) for name in ("roughness", "unreal_ColorRoughness")
+    )
+    rough = texels[..., 1]
+    assert np.ptp(rough) > 0.15
+    assert np.sqrt(0.25 * 0.4) - 0.005 <= rough.min() and rough.max() <= np.sqrt(0.4) + 0.005
+    np.testing.assert_allclose(rough**2, packed[..., 3], atol=0.005)
+    np.testing.assert_array_equal(texels[..., 2], 0.0)
+    path = tmp_path / "cards.glb"
+    mesh_export.write(path, [made])
+    before = set(bpy.data.materials)
+    bpy.ops.import_scene.gltf(filepath=str(path))
+    (material,) = (one for one in set(bpy.data.materials) - before if "Cards" in one.name)
+    (shader,) = (node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
+    (link,) = shader.inputs["Roughness"].links
+    assert link.from_socket.name == "Green"
+    (of_image,) = link.from_node.inputs[0].links
+    np.testing.assert_allclose(_pixels(of_image.from_node.image)[..., 1], rough, atol=0.002)
+
+
+def _pixels(image):
+    width, height = image.size
+    values = np.empty((height, width, 4), np.float32)
+    image.pixels.foreach_get(values.ravel())
+    return values

@@ -106,3 +106,22 @@ def test_packed_textures_have_their_values_in_unreals_channels(rng):
         assert set(found) == {f"unreal_{name}" for name in textures}
         for name, channels in textures.items():
             np.testing.assert_allclose(found[f"unreal_{name}"], np.dstack(channels), atol=1e-7)
+
+
+def test_texels_have_the_roughness_of_their_strands(strip):
+    """Two strands, side by side, of other roughness; packed textures have it too."""
+    places = np.concatenate([strip.places + np.array([x, 0.0, 0.0]) for x in (-0.25, 0.25)])
+    radii, colors = np.repeat(strip.radii, 2, axis=0), np.repeat(strip.colors, 2, axis=0)
+    both = PlacedStrands(places, radii, colors, np.zeros(2), (0.0, 1.0), roughness=np.float32([0.2, 0.6]))
+    x = (np.arange(2 * SIZE) + 0.5) / (2 * SIZE)
+    segments = np.broadcast_to(
+        np.where(np.abs(x - 0.25) < 0.1, 0, np.where(np.abs(x - 0.75) < 0.1, 2, NO_STRAND)), [64, 64]
+    )
+    sums = TexelSums(SIZE, has_roughness=True)
+    sums.add(segments, both, 2, np.zeros(2), range(SIZE))
+    found = sums.maps()
+    np.testing.assert_allclose(found["roughness"][:, 6:10], 0.2, atol=1e-6)
+    np.testing.assert_allclose(found["roughness"][:, 22:26], 0.6, atol=1e-6)
+    for layout, name in (("UNREAL", "Material"), ("UNREAL_COMPACT", "ColorRoughness")):
+        packed = texture_layouts.packed(found, layout, 0.9)[texture_layouts.PREFIX + name]
+        np.testing.assert_array_equal(packed[..., 3], found["roughness"])

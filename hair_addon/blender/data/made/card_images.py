@@ -14,10 +14,14 @@ from ...host.notices import name_of
 def new_images(name, maps, layout, roughness):
     """Return {map: image} of `TexelSums.maps` and of a layout, neither packed nor saved; "color" includes alpha.
 
+    The channels of "roughness", if strands differ in it, are those of glTF: 1, roughness of a surface, 0 (metallic).
     name: prefix of image names; layout: of `CardSettings`; roughness: of the look.
     """
     pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
     pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
+    if "roughness" in maps:
+        of_surface = texture_layouts.surface_roughness(maps["roughness"])
+        pixels["roughness"] = np.dstack([np.ones_like(of_surface), of_surface, np.zeros_like(of_surface)])
     pixels |= texture_layouts.packed(maps, layout, roughness)
     return {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
 
