@@ -261,7 +261,8 @@ CORNROWS = (
     press("vellus.apply_preset", preset="DARK_BROWN"),
 )
 
-BEARD = (
+# Paints the vertex group `Group`.
+BEARD_AREA = (
     select("Head"),
     press("object.vertex_group_add"),
     press("paint.weight_paint_toggle"),
@@ -284,6 +285,10 @@ BEARD = (
         ((0.033, -0.135, 0.65), (0.036, -0.13, 0.662)),
     ),
     weights(1.0, 0.005, ((0.0, -0.155, 0.677), (0.018, -0.15, 0.676), (0.033, -0.14, 0.668))),
+)
+
+BEARD = (
+    *BEARD_AREA,
     press("paint.weight_paint_toggle"),
     *grown(0.022, mask="Group", gravity=0.6),
     fields("hair", radius=3.0e-5),
