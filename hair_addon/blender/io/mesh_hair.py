@@ -81,11 +81,12 @@ def using_mesh(
     place, its_surface = Remembered(mesh_object), Remembered(surface_object)
 
     def compute(progress):
-        found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, part_of(progress, 0.0, 0.5))
+        alpha_at = pieces.alphas if settings.uses_alpha and pieces.has_alpha else None
+        reading = part_of(progress, 0.0, 0.5)
+        found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, reading, alpha_at)
+        if alpha_at is not None:
+            found = mesh_strands.shown(found, alpha_at(found.places), alpha_at, mesh)
         colored = pieces.colors(found.places)
-        if settings.uses_alpha and (colored[:, 3] < 1.0).any():
-            found = mesh_strands.shown(found, colored[:, 3], lambda places: pieces.colors(places)[:, 3], mesh)
-            colored = pieces.colors(found.places)
         means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
         if settings.reaches_surface:
             found = mesh_strands.on_surface(found, surface)

@@ -38,6 +38,8 @@ class MeshStrandSettings(Settings):
         True, "Start strands on the surface: cut them where they leave it, or extend them to it", label="Reach Surface"
     )
     uses_alpha: bool = param(
-        True, "End strands where the texture is transparent, and leave out strands that it hides", label="Use Alpha"
+        True,
+        "Run strands along the opaque parts of the texture, and end them where it is transparent",
+        label="Use Alpha",
     )
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)

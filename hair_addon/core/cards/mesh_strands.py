@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes of hair cards, tubes and solid locks → strands.
 
-Strands of a card run from its root end to its tip end, spread over its width with random offsets. Strands of a tube or
+Strands of a card run from its root end to its tip end, spread over its width with random offsets unless they fill it,
+along the opaque parts of its texture. Strands of a tube or
 a lock are evenly distributed over its cross sections, on the spiral of [Vogel79]. Strands that fill a tube or a lock
 with their radii are denser along its rim.
 """
@@ -16,7 +17,7 @@ from ..geometry.closest_point import SurfaceQuery
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
 from ..geometry.strands import curve_offsets
 from ..long_work import Progress, no_progress, part_of
-from . import lock_sections, ribbon_charts
+from . import alpha_paths, lock_sections, ribbon_charts
 from .mesh_pieces import Piece, pieces_of
 from .mesh_strand_settings import MOST_STRANDS, MeshStrandSettings
 
@@ -30,9 +31,16 @@ _LEAST_SHOWN = 0.25  # part of a strand that must be opaque
 _REACH = 0.25  # distance of a root to the surface, relative to the strand's length, that is bridged
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _INWARD = 0.2  # mean cosine between normals and the directions from the center, below which normals point inward
+_ROWS = 64  # rows in which a card's texture is sampled
+_CELLS, _FEWEST, _MOST = 2, 32, 256  # cells of a row for each strand, and the least and largest number
+_BATCH = 1 << 15  # largest number of cells in a row of the cards that are followed together
+_STEEP = 1.0  # cells that the border of an opaque part moves aside relative to the distance of rows, at 45 degrees
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
 _MOST_FACES = 20_000  # of a piece: larger pieces beside smaller pieces are bodies
 _MOST_SCULPTED = 500_000  # of a piece, if all pieces are larger than `_MOST_FACES`; takes ten seconds
+
+
+HIDDEN = "The texture of the hair mesh is transparent at all strands: turn off Use Alpha."
 
 
 @dataclass(frozen=True)
@@ -77,10 +85,13 @@ def mesh_strands(
     settings: MeshStrandSettings,
     corner_uvs: np.ndarray | None = None,
     progress: Progress = no_progress,
+    alpha_at: Callable[[SurfacePoints], np.ndarray] | None = None,
 ) -> MeshStrands:
     """Return the strands of a hair mesh, both in the same coordinates [m].
 
-    corner_uvs: (F, 3, 2) of triangles' corners, None without a UV map. Raises `HairError`.
+    corner_uvs: (F, 3, 2) of triangles' corners, None without a UV map; alpha_at: a function that returns the alpha (N,)
+    in [0, 1] of the texture at places on the hair mesh, which strands of cards follow, None without. Raises
+    `HairError`.
     """
     if settings.root_end != "SURFACE" and corner_uvs is None:
         raise HairError("The hair mesh has no UV map: choose its roots by the surface.")
@@ -88,11 +99,15 @@ def mesh_strands(
     pieces = pieces_of(mesh)
     counts = _shares(mesh, pieces, settings.strand_count)
     has_small = any(len(piece.faces) <= _MOST_FACES for piece in pieces)
-    maker = _Maker(mesh, surface, settings, corner_uvs, _MOST_FACES if has_small else _MOST_SCULPTED)
+    most_faces = _MOST_FACES if has_small else _MOST_SCULPTED
+    maker = _Maker(mesh, surface, settings, corner_uvs, most_faces)
     for place, (piece, count) in enumerate(zip(pieces, counts.tolist(), strict=True)):
         if place % 256 == 0:
-            part_of(progress, 0.1, 0.8)("Following cards", place / len(pieces))
+            part_of(progress, 0.1, 0.8 if alpha_at is None else 0.4)("Following cards", place / len(pieces))
         maker.add(piece, count)
+    maker.require_count()
+    if alpha_at is not None:
+        maker.follow_textures(alpha_at, part_of(progress, 0.4, 0.8))
     progress("Placing strands", 0.8)
     return maker.strands()
 
@@ -108,6 +123,51 @@ def _shares(mesh, pieces, count):
     return 1 + np.diff(ends, prepend=0)
 
 
+@dataclass(frozen=True)
+class _Lines:
+    """Strands on a card's chart: queries (Q, 2) across and along, counts of strands' points, and radii (Q,) [m]."""
+
+    queries: np.ndarray
+    counts: np.ndarray
+    radii: np.ndarray
+
+    @classmethod
+    def none(cls):
+        return cls(np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0))
+
+
+@dataclass
+class _Card:
+    """A card: its `Layout`, corners (f, 3, 2) of its triangles on the chart, their faces (f,) of the mesh, widths [m]
+    at stations, and places across and lines of its strands.
+    """
+
+    chart: ribbon_charts.Layout
+    flat: np.ndarray
+    faces: np.ndarray
+    widths: np.ndarray
+    across: np.ndarray
+    lines: _Lines
+
+    @property
+    def count(self):
+        return len(self.across)
+
+
+@dataclass(frozen=True)
+class _Lock:
+    """Strands of a tube or a lock: points (count * K, 3), corners of the mesh there, and radii (K,) [m]."""
+
+    count: int
+    radii: np.ndarray
+    points: np.ndarray
+    corners: np.ndarray
+
+    @property
+    def stations(self):
+        return len(self.radii)
+
+
 class _Maker:
     """Strands of the pieces of a mesh, which are added in turn."""
 
@@ -117,8 +177,8 @@ class _Maker:
         self._vertices = mesh.vertices.astype(np.float64)
         self._random = np.random.default_rng(settings.seed)
         self._charts = ribbon_charts.Charts()
-        self._flat, self._faces, self._queries = [], [], []  # of cards
-        self._parts = []  # of pieces: (is a card, strand count, station count, radii (K,), points, vertices' corners)
+        self._cards: list[_Card] = []
+        self._parts: list[_Card | _Lock] = []
         self._skipped = 0
 
     def add(self, piece: Piece, count: int) -> None:
@@ -131,35 +191,56 @@ class _Maker:
         else:
             self._add_lock(piece, points, count)
 
-    def strands(self) -> MeshStrands:
-        """Return the strands of all pieces. Raises `HairError` if there are none."""
+    def follow_textures(self, alpha_at: Callable[[SurfacePoints], np.ndarray], progress: Progress) -> None:
+        """Replace the lines of cards with transparent parts by lines along the opaque parts."""
+        groups: dict[int, list[_Card]] = {}
+        for card in self._cards:
+            cells = 1 << int(np.ceil(np.log2(_CELLS * card.count)))
+            groups.setdefault(min(max(cells, _FEWEST), _MOST), []).append(card)
+        done = 0
+        for cells, cards in groups.items():
+            size = max(_BATCH // cells, 1)
+            for first in range(0, len(cards), size):
+                progress("Following textures", done / len(self._cards))
+                some = cards[first : first + size]
+                self._follow_texture_of(some, cells, alpha_at)
+                done += len(some)
+
+    def require_count(self) -> None:
+        """Raise `HairError` without strands, and for too many of them."""
         if not self._parts:
             raise HairError(
                 "The hair mesh has no cards, tubes or slender locks of at most {most} triangles: pick a mesh of them.",
                 most=self._most_faces,
             )
-        total = sum(part[1] for part in self._parts)
+        total = sum(part.count for part in self._parts)
         if total > MOST_STRANDS:
             raise HairError("{count} strands exceed {most}: use fewer strands.", count=total, most=MOST_STRANDS)
+
+    def strands(self) -> MeshStrands:
+        """Return the strands of all pieces. Raises `HairError` if the texture hides all of them."""
         points, faces, barycentric = self._on_charts()
         found: list[tuple] = []
         used = 0
-        for is_card, count, stations, radii, own, corners in self._parts:
-            size = count * stations
-            if is_card:
-                rows = slice(used, used + size)
-                found.append((points[rows], faces[rows], barycentric[rows], np.tile(radii, count)))
-                used += size
+        for part in self._parts:
+            if isinstance(part, _Card):
+                rows = slice(used, used + len(part.lines.radii))
+                found.append((points[rows], faces[rows], barycentric[rows], part.lines.radii, part.lines.counts))
+                used = rows.stop
             else:
-                found.append((own, corners // 3, np.eye(3, dtype=np.float32)[corners % 3], np.tile(radii, count)))
+                weights = np.eye(3, dtype=np.float32)[part.corners % 3]
+                counts = np.full(part.count, part.stations)
+                found.append((part.points, part.corners // 3, weights, np.tile(part.radii, part.count), counts))
         merged = [np.concatenate(rows) for rows in zip(*found, strict=True)]
-        counts = np.array([part[1] for part in self._parts])
+        if not len(merged[4]):
+            raise HairError(HIDDEN)
+        strand_counts = [len(rows[4]) for rows in found]
         return MeshStrands(
             merged[0].astype(np.float32),
-            np.repeat([part[2] for part in self._parts], counts),
+            merged[4],
             merged[3].astype(np.float32),
             SurfacePoints(merged[1].astype(np.int32), merged[2].astype(np.float32)),
-            np.repeat(np.arange(len(counts)), counts).astype(np.int32),
+            np.repeat(np.arange(len(found)), strand_counts).astype(np.int32),
             len(self._parts),
             self._skipped,
         )
@@ -169,15 +250,45 @@ class _Maker:
         away = self._away[piece.vertices]
         chart, widths = self._charts.chart(piece.topology, points, uvs, away, self._root_first(away, uvs))
         across = (np.arange(count) + 0.5) / count
-        if count > 1:
+        if count > 1 and not self._settings.fills:  # strands that fill a card leave no gaps
             across += (self._random.random(count) - 0.5) * (_JITTER / count)
-        queries = np.empty((count, len(chart.stations), 3))
-        queries[..., 0] = chart.left + across[:, None] * (chart.right - chart.left)
-        queries[..., 1], queries[..., 2] = chart.stations, _LAYER * len(self._flat)
-        self._queries.append(queries)
-        self._flat.append(chart.places[piece.topology.triangles])
-        self._faces.append(piece.faces)
-        self._parts.append((True, count, len(chart.stations), widths / (2.0 * count), None, None))
+        flat = chart.places[piece.topology.triangles]
+        card = _Card(chart, flat, piece.faces, widths, across, _straight(chart, widths, across))
+        self._cards.append(card)
+        self._parts.append(card)
+
+    def _follow_texture_of(self, cards, cells, alpha_at):
+        """Replace the lines of cards, each with rows of some number of cells."""
+        across, along = (np.arange(cells) + 0.5) / cells, (np.arange(_ROWS) + 0.5) / _ROWS
+        shape = len(cards), _ROWS, cells
+        layouts = {id(card.chart): card for card in cards}
+        on_layouts = _located(
+            [card.flat for card in layouts.values()],
+            [card.chart.queries(across[None], along[:, None]) for card in layouts.values()],
+        )
+        grids = dict(zip(layouts, on_layouts, strict=True))
+        places = SurfacePoints(
+            np.concatenate([card.faces[grids[id(card.chart)][0]] for card in cards]).astype(np.int32),
+            np.concatenate([grids[id(card.chart)][1] for card in cards]),
+        )
+        opaque = alpha_at(places).reshape(shape) >= _OPAQUE
+        measured = np.arange(len(places)).reshape(shape)[:, :, [0, cells // 2, -1]]
+        points = positions(self._mesh, places[measured.ravel()]).astype(np.float64).reshape(len(cards), _ROWS, 3, 3)
+        widths = np.linalg.norm(points[:, 1:, 2] - points[:, 1:, 0], axis=2) / (cells - 1)
+        steps = np.linalg.norm(np.diff(points[:, :, 1], axis=1), axis=2)
+        steepness = np.maximum(_STEEP * steps / np.maximum(widths, 1e-30), 1.0)
+        is_shown = opaque.any(axis=(1, 2))
+        for card, is_any in zip(cards, is_shown, strict=True):
+            if not is_any:
+                card.lines = _Lines.none()
+        chosen = np.flatnonzero(is_shown & ~opaque.all(axis=(1, 2)))
+        if not len(chosen):
+            return
+        owners = np.repeat(np.arange(len(chosen)), [cards[place].count for place in chosen])
+        starts = np.concatenate([cards[place].across for place in chosen])
+        paths = alpha_paths.traced(opaque[chosen], steepness[chosen], owners, starts)
+        for number, place in enumerate(chosen):
+            cards[place].lines = _along(cards[place].chart, cards[place].widths, paths, owners == number)
 
     def _add_lock(self, piece, points, count):
         uvs = self._piece_uvs(piece)
@@ -200,8 +311,7 @@ class _Maker:
         corners = np.empty(len(piece.vertices), np.int64)
         triangle, corner = np.nonzero(piece.first_corners)
         corners[piece.topology.triangles[triangle, corner]] = 3 * piece.faces[triangle] + corner
-        stations = found.shape[1]
-        self._parts.append((False, count, stations, radii, found.reshape(-1, 3), corners[vertices].ravel()))
+        self._parts.append(_Lock(count, radii, found.reshape(-1, 3), corners[vertices].ravel()))
 
     def _piece_uvs(self, piece):
         """Return UV coordinates (v, 2) of a piece's vertices, or None."""
@@ -227,22 +337,65 @@ class _Maker:
 
     def _on_charts(self):
         """Return (points (Q, 3), faces (Q,), barycentric (Q, 3)) of the queries on all charts."""
-        if not self._flat:
+        if not self._cards:
             return np.zeros((0, 3)), np.zeros(0, int), np.zeros((0, 3))
-        faces = np.concatenate(self._faces)
-        layers = np.repeat(_LAYER * np.arange(len(self._flat)), [len(chart) for chart in self._flat])
-        flat = np.concatenate(
-            [np.concatenate(self._flat), np.broadcast_to(layers[:, None, None], (len(faces), 3, 1))], 2
-        )
-        layout = TriMesh(
-            flat.reshape(-1, 3).astype(np.float32), np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3)
-        )
-        queries = np.concatenate([query.reshape(-1, 3) for query in self._queries]).astype(np.float32)
-        found = SurfaceQuery(layout).nearest(queries)
-        on_mesh = faces[found.triangle]
-        weights = found.barycentric.astype(np.float64)
+        found = _located([card.flat for card in self._cards], [card.lines.queries for card in self._cards])
+        on_mesh = np.concatenate([card.faces[places[0]] for card, places in zip(self._cards, found, strict=True)])
+        weights = np.concatenate([places[1] for places in found]).astype(np.float64)
         corners = self._vertices[self._mesh.triangles[on_mesh]]
         return np.einsum("qc,qci->qi", weights, corners), on_mesh, weights
+
+
+def _located(charts, queries):
+    """Return [(triangles (Q,), barycentric (Q, 3) float32)] of queries [(Q, 2)] on charts [(f, 3, 2)]."""
+    layers = np.repeat(_LAYER * np.arange(len(charts)), [len(chart) for chart in charts])
+    corners = np.concatenate(charts)
+    flat = np.concatenate([corners, np.broadcast_to(layers[:, None, None], (len(corners), 3, 1))], 2)
+    layout = TriMesh(flat.reshape(-1, 3).astype(np.float32), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+    counts = [len(query) for query in queries]
+    heights = np.repeat(_LAYER * np.arange(len(charts)), counts)
+    asked = np.concatenate([np.concatenate(queries), heights[:, None]], axis=1).astype(np.float32)
+    found = SurfaceQuery(layout).nearest(asked)
+    firsts = np.repeat(np.cumsum([0] + [len(chart) for chart in charts[:-1]]), counts)
+    ends = np.cumsum(counts)[:-1]
+    return list(zip(np.split(found.triangle - firsts, ends), np.split(found.barycentric, ends), strict=True))
+
+
+def _straight(chart, widths, across):
+    """Return the `_Lines` of strands (n,) across a card, without a texture."""
+    count = len(across)
+    queries = chart.queries(across[:, None], chart.stations[None])
+    return _Lines(queries, np.full(count, len(chart.stations)), np.tile(widths / (2.0 * count), count))
+
+
+def _along(chart, widths, paths, is_own):
+    """Return the `_Lines` of a card along its paths; is_own: (S,) of all paths. Short ones are left out."""
+    first, last = paths.first[is_own], paths.last[is_own]
+    is_long = last - first + 1 >= _LEAST_SHOWN * _ROWS
+    first, last = first[is_long] / _ROWS, (last[is_long] + 1) / _ROWS
+    if not len(first):
+        return _Lines.none()
+    inner = _between(chart.stations)
+    along = np.clip(inner, first[:, None], last[:, None])
+    # Stations outside of a strand are at its ends, once.
+    keeps = np.ones(along.shape, bool)
+    keeps[:, 1:-1] = (inner[1:-1] > first[:, None]) & (inner[1:-1] < last[:, None])
+    rows = along * _ROWS - 0.5
+    low = np.clip(rows.astype(int), 0, _ROWS - 2)
+    share, strand = np.clip(rows - low, 0.0, 1.0), np.arange(len(along))[:, None]
+    across, covered = (
+        (1.0 - share) * values[is_own][is_long][strand, low] + share * values[is_own][is_long][strand, low + 1]
+        for values in (paths.places, paths.widths)
+    )
+    radii = 0.5 * covered * np.interp(along, chart.stations, widths)
+    return _Lines(chart.queries(across, along)[keeps.ravel()], keeps.sum(axis=1), radii[keeps])
+
+
+def _between(stations):
+    """Return stations, divided until there are at least a third as many as rows."""
+    parts = -(-(_ROWS // 3) // (len(stations) - 1))
+    at = np.arange((len(stations) - 1) * parts + 1) / parts
+    return np.interp(at, np.arange(len(stations)), stations)
 
 
 def _is_closed_at_tip(topology, points):
@@ -279,7 +432,7 @@ def shown(
     cut = _cut(strands, (starts + last)[is_cut], alpha_at, mesh)
     found = cut.some(place <= np.repeat(last + is_cut, strands.counts))
     if not len(found.counts):
-        raise HairError("The texture of the hair mesh is transparent at all strands: turn off Use Alpha.")
+        raise HairError(HIDDEN)
     return found
 
 

@@ -35,6 +35,12 @@ class Layout:
     left: np.ndarray
     right: np.ndarray
 
+    def queries(self, across: np.ndarray, along: np.ndarray) -> np.ndarray:
+        """Return coordinates (Q, 2) of places across the card, from 0 to 1 between its sides, and along it."""
+        left, right = (np.interp(along, self.stations, side) for side in (self.left, self.right))
+        place = left + across * (right - left)
+        return np.stack([place, np.broadcast_to(along, place.shape)], axis=-1).reshape(-1, 2)
+
 
 class Charts:
     """Charts of cards, which share the layouts of cards with the same faces."""

@@ -53,18 +53,36 @@ class HairPieces:
         has_own = self.corner_colors is not None
         return has_own or all(one.color_image is not None or one.color is not None for one in used)
 
+    @property
+    def has_alpha(self) -> bool:
+        """Whether a material may be transparent."""
+        used = (self.materials[slot] for slot in np.unique(self.slots))
+        return any(one.alpha < 1.0 or one.alpha_image is not None for one in used)
+
+    def alphas(self, places: SurfacePoints) -> np.ndarray:
+        """Return the alpha (N,) float64 at places on the mesh."""
+        uvs, slots = self._uvs(places), self.slots[places.triangle]
+        found = np.empty(len(places))
+        for slot in np.unique(slots):
+            rows = np.flatnonzero(slots == slot)
+            found[rows] = _alphas(self.materials[slot], None if uvs is None else uvs[rows], len(rows))
+        return found
+
+    def _uvs(self, places):
+        """Return (N, 2) UV coordinates of places, None without a UV map."""
+        if self.corner_uvs is None:
+            return None
+        return np.einsum("nc,ncu->nu", places.barycentric.astype(np.float64), self.corner_uvs[places.triangle])
+
     def colors(self, places: SurfacePoints) -> np.ndarray:
         """Return (N, 4) float64 at places on the mesh: linear colors multiplied by alpha, and alpha."""
         found = np.ones((len(places), 4))
         weights, slots = places.barycentric.astype(np.float64), self.slots[places.triangle]
-        uvs = None
-        if self.corner_uvs is not None:
-            uvs = np.einsum("nc,ncu->nu", weights, self.corner_uvs[places.triangle])
+        uvs = self._uvs(places)
         for slot in np.unique(slots):
             rows, material = np.flatnonzero(slots == slot), self.materials[slot]
-            color, alpha = np.ones((len(rows), 3)), np.full(len(rows), material.alpha)
-            if uvs is not None and material.alpha_image is not None:
-                alpha *= _sampled(material.alpha_image, uvs[rows])[:, material.alpha_channel]
+            color = np.ones((len(rows), 3))
+            alpha = _alphas(material, None if uvs is None else uvs[rows], len(rows))
             if uvs is not None and material.color_image is not None:
                 color = maps.pixels.unpremultiplied(_sampled(material.color_image, uvs[rows]))[0]
             elif self.corner_colors is not None:
@@ -74,6 +92,14 @@ class HairPieces:
                 color[:] = material.color[:3]
             found[rows, :3], found[rows, 3] = color * alpha[:, None], alpha
         return found
+
+
+def _alphas(material, uvs, count):
+    """Return the alpha (count,) of a material at UVs (count, 2), or None."""
+    alpha = np.full(count, material.alpha)
+    if uvs is not None and material.alpha_image is not None:
+        alpha *= _sampled(material.alpha_image, uvs)[:, material.alpha_channel]
+    return alpha
 
 
 def _sampled(tiles, uvs):
