@@ -69,7 +69,8 @@ def test_a_missing_image_is_refused_and_named(sky, tmp_path):
     refused = render(shot, "--frames", "1-2")
     assert (refused.status, refused.out, [*tmp_path.glob("out/*")]) == (1, "", [])
     assert refused.errors == (
-        "vellus: Files are missing: //sky.exr; restore or relink them, or render without them by --allow-missing.\n"
+        "vellus: Files are missing or damaged: //sky.exr; restore or relink them, or render without them by "
+        "--allow-missing.\n"
     )
     allowed = render(shot, "--frames", "1", "--allow-missing")
     assert (allowed.status, [line["frame"] for line in allowed.results]) == (0, [1])
@@ -81,6 +82,43 @@ def test_a_missing_image_is_refused_and_named(sky, tmp_path):
     assert [line["frame"] for line in render(shot, "--frames", "1-2", "--overwrite").results] == [1, 2]
     assert read_picture(tmp_path / "out" / "f_0001.exr")[:3] == pytest.approx(SKY[:3], abs=1e-3)
     assert render(shot, "--frames", "1-2").results == []
+
+
+@pytest.mark.parametrize("owner", ["world", "light", "surface"])
+def test_a_damaged_image_is_named(sky, owner, tmp_path):
+    """A truncated image of a world, a lamp or a surface is refused like a missing one, until it is whole again."""
+    if owner == "world":
+        node = sky
+    elif owner == "light":
+        tree = bpy.data.objects["Sun"].data.node_tree
+        node = image_node(tree, None)
+        tree.links.new(node.outputs[0], next(one for one in tree.nodes if one.type == "EMISSION").inputs[0])
+    else:
+        material = bpy.data.materials.new("Skin")
+        bpy.data.meshes["Icosphere"].materials.append(material)
+        node = image_node(material.node_tree, None)
+        material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Principled BSDF"].inputs[0])
+    path = write_image(tmp_path / "a.exr")
+    node.image = new_image(path)
+    whole = path.read_bytes()
+    for data, expected in ((whole, []), (whole[: len(whole) // 2], [str(path)]), (whole, []), (b"", [str(path)])):
+        path.write_bytes(data)
+        os.utime(path, (0, len(data)))
+        assert named() == expected
+
+
+def test_a_missing_or_damaged_light_profile_is_named(lit, tmp_path):
+    tree = bpy.data.objects["Sun"].data.node_tree
+    node, path = tree.nodes.new("ShaderNodeTexIES"), tmp_path / "lamp.ies"
+    node.mode, node.filepath = "EXTERNAL", str(path)
+    assert named() == []  # no link
+    tree.links.new(node.outputs[0], next(one for one in tree.nodes if one.type == "EMISSION").inputs["Strength"])
+    assert named() == [str(path)]
+    profile = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1.0 2 1 1 2 0 0 0\n1.0 1.0 0\n0 90\n0\n1000 500\n"
+    for data, expected in ((profile, []), (profile[:-5], [str(path)]), ("not a lamp", [str(path)])):
+        path.write_text(data)
+        os.utime(path, (0, len(data)))
+        assert named() == expected
 
 
 def test_frames_with_another_texture_are_not_mixed(sky, tmp_path):
@@ -98,13 +136,13 @@ def test_frames_with_another_texture_are_not_mixed(sky, tmp_path):
 
 def test_scripts_and_the_engine_refuse_too(sky, tmp_path):
     sky.image = new_image(tmp_path / "sky.exr")
-    with pytest.raises(HairError, match=r"Files are missing: .*sky\.exr"):
+    with pytest.raises(HairError, match=r"Files are missing or damaged: .*sky\.exr"):
         api.render(tmp_path / "still.exr", width=16, height=16, sample_count=1)
     assert not (tmp_path / "still.exr").exists()
     api.render(tmp_path / "still.exr", width=16, height=16, sample_count=1, allow_missing=True)
     scene = bpy.context.scene
     scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "VELLUS", 16, 16
-    with pytest.raises(RuntimeError, match=r"Files are missing: .*sky\.exr"):
+    with pytest.raises(RuntimeError, match=r"Files are missing or damaged: .*sky\.exr"):
         bpy.ops.render.render()
 
 
@@ -250,7 +288,7 @@ def test_a_missing_library_is_refused_and_named(linked, scene, tmp_path, file, b
     if becomes is not None:
         path.write_bytes((linked / f"{becomes}.blend").read_bytes())
     refused = render(shot, out="g.png")
-    assert refused.status == 1 and f"Files are missing: {reported}" in refused.errors
+    assert refused.status == 1 and f"Files are missing or damaged: {reported}" in refused.errors
     assert not (tmp_path / "out" / "g.png").exists()
     allowed = render(shot, "--allow-missing", out="g.png")
     assert allowed.status == 0 and "warning: rendered without missing files: //" in allowed.errors

@@ -225,17 +225,27 @@ def _panorama_of(world, time, waits):
     meanwhile.
     """
     try:
-        path = world_panoramas.file_of(world, time, waits)
+        image = picture_jobs.read(lambda: _read_panorama(world, time, waits), waits)
     except HairError as error:
         if waits:
             raise
         say(str(error))
-        path = None
-    else:
-        path = path or picture_jobs.last_of(world)
+        image = None
+    return World(np.array(world.color)) if image is None else World(np.ones(3), image, np.eye(4))
+
+
+def _read_panorama(world, time, waits):
+    """Return the `StudioImage` of a panorama; None if there is none or its file was damaged."""
+    path = world_panoramas.file_of(world, time, waits) or picture_jobs.last_of(world)
     if path is None:
-        return World(np.array(world.color))
-    return World(np.ones(3), image_of(str(path)), np.eye(4))
+        return None
+    image = image_of(str(path))
+    try:
+        image.layers  # noqa: B018 reads the file
+    except HairError:
+        path.unlink(missing_ok=True)
+        return None
+    return image
 
 
 def _load_frame(image, user, scene_frame):

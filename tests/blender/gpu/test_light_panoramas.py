@@ -9,6 +9,7 @@ from mathutils import Euler, Matrix, Vector
 from hair_addon.blender.data.pictures import light_panoramas, picture_jobs, world_panoramas
 from hair_addon.blender.gpu import lights
 from hair_addon.blender.io.pictures import light_panorama
+from hair_addon.core.errors import HairError
 
 IES = """IESNA:LM-63-2002
 TILT=NONE
@@ -143,13 +144,37 @@ def test_light_of_nodes_arrives_as_in_cycles(scene, tmp_path, monkeypatch, name)
     monkeypatch.setattr(world_panoramas, "kept_or_rendered", kept_or_rendered)
     evaluated = lamp.evaluated_get(bpy.context.evaluated_depsgraph_get())
     place, is_scaled = np.array(lamp.matrix_world), light_panoramas._is_scaled(evaluated.data)
-    assert light_panoramas.find(evaluated.data, place, 1.0, True) is None
+    assert light_panoramas.find(evaluated.data, place, 1.0, False) is None
     shone = by_cycles(scene, matrix, tmp_path)
     without_nodes(lamp.data)
     shone /= by_cycles(scene, matrix, tmp_path)
     light_panorama.render(tmp_path / "light.blend", "Lamp", options[0], 1.0, False, tmp_path / "light.npz")
     factor = light_panoramas._read(tmp_path / "light.npz", is_scaled).factor(place, PLACE)
     np.testing.assert_allclose(factor, shone, rtol=0.02)
+
+
+@pytest.mark.parametrize("damaged_count", [1, 2])
+def test_a_damaged_panorama_is_rendered_again(scene, tmp_path, monkeypatch, damaged_count):
+    """A render waits for another panorama, or fails if that one is damaged too. A view has the plain light."""
+    kind, matrix, nodes = LIGHTS["point, tinted"]
+    light = add_light(scene, kind, matrix, nodes).evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    path, made = tmp_path / f"{damaged_count}.npz", []
+
+    def kept_or_rendered(*_given, **_values):
+        if not path.exists():
+            np.savez(path, lit=np.ones((4, 8, 3)), plain=np.ones((4, 8)))
+            made.append(path.read_bytes())
+            path.write_bytes(made[-1][:200] if len(made) <= damaged_count else made[-1])
+        return path
+
+    monkeypatch.setattr(world_panoramas, "kept_or_rendered", kept_or_rendered)
+    if damaged_count == 1:
+        assert light_panoramas.find(light, np.eye(4), 1.0, False) is None
+        assert light_panoramas.find(light, np.eye(4), 1.0, True).lit.shape == (4, 8, 3)
+    else:
+        with pytest.raises(HairError, match="damaged"):
+            light_panoramas.find(light, np.eye(4), 1.0, True)
+    assert len(made) == 2
 
 
 def test_hair_receives_the_mean_of_its_places():

@@ -343,7 +343,7 @@ def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, other_bl
     rotation, _part = mixed_world(scene)
     rotation.default_value = (0.21, 0.0, 0.0)
     former = kept_files.folder("worlds") / f"{world_digest.digest_of(scene.world)}.exr"
-    former.write_bytes(b"")
+    light_images.write_colors(former, np.ones((2, 4, 3)))
     assert lights.read_world(scene, waits=False).image.path == str(former)
     assert not picture_jobs.sentences()
     other_blender(SLEEP)
@@ -353,6 +353,28 @@ def test_a_view_has_the_last_panorama_while_the_next_is_rendered(scene, other_bl
     assert '"World"' in sentence and not is_error
     former.unlink()
     assert lights.read_world(scene, waits=False).image is None
+
+
+@pytest.mark.parametrize("damaged_count", [1, 2])
+def test_a_damaged_panorama_of_a_world_is_rendered_again(scene, tmp_path, monkeypatch, damaged_count):
+    """A render waits for another panorama, or fails if that one is damaged too."""
+    mixed_world(scene)
+    path, made = tmp_path / "sky.exr", []
+
+    def file_of(*_given):
+        if not path.exists():
+            light_images.write_colors(path, np.ones((2, 4, 3)))
+            made.append(path.read_bytes())
+            path.write_bytes(made[-1][:-9] if len(made) <= damaged_count else made[-1])
+        return path
+
+    monkeypatch.setattr(world_panoramas, "file_of", file_of)
+    if damaged_count == 1:
+        assert lights.read_world(scene).image.size == (4, 2)
+    else:
+        with pytest.raises(HairError, match="damaged"):
+            lights.read_world(scene)
+    assert len(made) == 2
 
 
 def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):

@@ -20,6 +20,7 @@ from hair_addon.blender.data.pictures import (
 from hair_addon.blender.host import background_process, cli_command
 from hair_addon.blender.io.pictures import surface_bake
 from hair_addon.blender.render import offscreen
+from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.pictures.rendering import add_orthographic_camera
 
@@ -220,6 +221,33 @@ def test_each_material_of_each_object_is_baked(stage, tmp_path, monkeypatch):
     np.testing.assert_allclose(again.pop(painted.session_uid), [(0.3, 0.1, 0.2)], atol=1e-3)
     assert all(np.allclose(again[uid], found[uid]) for uid in again)
     assert baked == [5, 4]
+
+
+@pytest.mark.parametrize("damaged_count", [1, 2])
+def test_damaged_pictures_are_baked_again(stage, tmp_path, monkeypatch, damaged_count):
+    """A render waits for other pictures, or fails if these are damaged too."""
+    placed, made = wall(plain_color("Skin", (0.5, 0.5, 0.5))[0]), []
+
+    def files_of(_kind, owners, _waits, **_values):
+        (key,) = owners
+        path = tmp_path / f"{damaged_count}.npz"
+        if not path.exists():
+            flat = np.ones((2, 2), np.float16)
+            arrays = {"roughness": flat, "metallic": flat, "weight": flat, "normal": np.zeros(0, np.float16)}
+            np.savez(path, uvs=np.zeros((4, 2), np.float32), color=np.ones((2, 2, 3), np.float16), **arrays)
+            made.append(path.read_bytes())
+            path.write_bytes(made[-1][:200] if len(made) <= damaged_count else made[-1])
+        return {key: path}, []
+
+    monkeypatch.setattr(picture_jobs, "files_of", files_of)
+    bpy.context.view_layer.update()
+    shown = [placed.evaluated_get(bpy.context.evaluated_depsgraph_get())]
+    if damaged_count == 1:
+        assert list(surface_bakes.find(shown, None, 1.0, True, True)) == [placed.session_uid]
+    else:
+        with pytest.raises(HairError, match="damaged"):
+            surface_bakes.find(shown, None, 1.0, True, True)
+    assert len(made) == 2
 
 
 def test_unsaved_pixels_are_of_the_local_image(stage, tmp_path):

@@ -105,10 +105,14 @@ def find(light, matrix, frame, waits):
     found = hashlib.blake2b(world_digest.digest_of(light).encode(), digest_size=16)
     found.update(repr((SIZE, WIDE_SIZE, AREA_SIZE, rows, [getattr(light, name, None) for name in _SETTINGS])).encode())
     path = kept_files.folder("lights") / f"{found.hexdigest()}.npz"
-    made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
-    path = made or picture_jobs.last_of(light)
-    is_scaled = _is_scaled(light)
-    return None if path is None else picture_cache.get((path, is_scaled), lambda: _read(path, is_scaled))
+
+    def read():
+        """Return the `Panorama`, None if there is none or its file was damaged."""
+        made = world_panoramas.kept_or_rendered("light", light, path, waits, frame=float(frame), matrix=rows)
+        shown, is_scaled = made or picture_jobs.last_of(light), _is_scaled(light)
+        return None if shown is None else picture_cache.get((shown, is_scaled), lambda: _read(shown, is_scaled))
+
+    return picture_jobs.read(read, waits)
 
 
 def _is_placed(light):
@@ -124,7 +128,7 @@ def _is_scaled(light):
 def _read(path, is_scaled):
     """Return the `Panorama` of a file; None if it is damaged, and it is rendered again."""
     try:
-        with np.load(path) as found:
+        with path.open("rb") as file, np.load(file) as found:
             lit, plain = found["lit"].astype(float), found["plain"].astype(float)
     except (OSError, ValueError, KeyError, zipfile.BadZipFile):
         path.unlink(missing_ok=True)

@@ -21,6 +21,15 @@ def images(owner):
     return found
 
 
+def light_profiles(owner):
+    """Return the paths, as in the .blend, of the IES profiles that contribute to the result of a node tree, or of its
+    owner's tree.
+    """
+    tree = owner if isinstance(owner, bpy.types.NodeTree) else owner.node_tree
+    nodes = [] if tree is None else [node for node in _live(tree) if node.type == "TEX_IES"]
+    return [node.filepath for node in nodes if node.mode == "EXTERNAL" and node.filepath]
+
+
 def _live(tree):
     """Return the nodes from which links lead to an output node other than a viewer; muted nodes are left out."""
     before = {}

@@ -143,6 +143,19 @@ def files_of(kind, owners, waits, **values):
     return found, errors
 
 
+def read(read_files, waits):
+    """Return pictures from read_files(), which returns None if a file was damaged and removed.
+
+    waits: read again, as the file is then made again. Raises `HairError` if that file is damaged too.
+    """
+    found = read_files()
+    if found is None and waits:
+        found = read_files()
+        if found is None:
+            raise HairError("Files that Cycles has rendered are damaged: check the disk.")
+    return found
+
+
 def _make(kind, owners, waits, used, values):
     """Make the missing files of {path: original}; return a `HairError` of each that cannot be made.
 

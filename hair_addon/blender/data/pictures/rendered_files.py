@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that renders of a scene read, and which of them are missing: linked libraries, images, mesh caches, volumes.
+"""Files that renders of a scene read, and which of them are missing or damaged: linked libraries, images, IES profiles,
+mesh caches, volumes.
 
-Blender renders without missing files, black or otherwise wrong, and reports success.
+Blender renders without such files, black or otherwise wrong, and reports success.
 """
 
 import hashlib
@@ -12,15 +13,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import imbuf
 
 from ....core.errors import HairError
+from ....core.imaging import whole_images
+from ...host.caches import Cache
 from . import live_nodes
 
 MOST_NAMED = 4  # maximum number of missing files in a sentence
 
-# First bytes of Blender's image formats; files with others are checked by loading them in Blender.
-_SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"#?", b"RIFF", b"8BPS", b"SDPX")
-_SIGNATURES += (b"XPDS", b"BM", b"\0\0\0\x0cjP", b"\xff\x4f\xff\x51")
+IMAGE, PROFILE = "image", "IES profile"
+
+readable_cache = Cache(capacity=4096)  # (path, time of the last change [ns], size) → whether the file can be read
+
 _OWNERS_WITH_NODES = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.NodeTree)
 
 
@@ -33,7 +38,7 @@ class RenderedFile:
 
     name: str
     paths: tuple[Path, ...]
-    is_image: bool = False
+    kind: str = ""  # `IMAGE`, `PROFILE`, or empty for other files
     siblings: tuple[Path, ...] = ()
 
 
@@ -42,7 +47,7 @@ def require(scene: bpy.types.Scene, numbers: Iterable[int]) -> None:
     names = missing(scene, numbers)
     if names:
         raise HairError(
-            "Files are missing: {names}; restore or relink them, or render without them by --allow-missing.",
+            "Files are missing or damaged: {names}; restore or relink them, or render without them by --allow-missing.",
             names=in_short(names),
         )
 
@@ -142,6 +147,9 @@ def _files(reached, numbers) -> Iterator[RenderedFile]:
         for image, user in _image_users(datablock):
             users.setdefault(image, []).append(user)
     for datablock in reached:
+        if isinstance(datablock, _OWNERS_WITH_NODES):
+            for path in live_nodes.light_profiles(datablock):
+                yield RenderedFile(path, (_absolute(path, datablock.library),), kind=PROFILE)
         if isinstance(datablock, bpy.types.Image):
             yield from _image_files(datablock, users.get(datablock, ()), numbers)
         elif isinstance(datablock, bpy.types.Volume) and datablock.packed_file is None:
@@ -168,14 +176,14 @@ def _image_files(image, users, numbers):
     path = _absolute(image.filepath, image.library)
     if image.source == "TILED":
         paths = tuple(_tile(path, tile.number) for tile in image.tiles)
-        yield RenderedFile(image.filepath, paths, is_image=True)
+        yield RenderedFile(image.filepath, paths, kind=IMAGE)
     elif image.source == "SEQUENCE":
         timed = [user for user in users if hasattr(user, "frame_duration")]
         needed = sorted({_image_number(user, number) for user in timed for number in numbers})
         paths = tuple(_numbered(path, number) for number in needed) or (path,)
-        yield RenderedFile(image.filepath, paths, is_image=True, siblings=_row_of(path))
+        yield RenderedFile(image.filepath, paths, kind=IMAGE, siblings=_row_of(path))
     else:
-        yield RenderedFile(image.filepath, (path,), is_image=image.source == "FILE")
+        yield RenderedFile(image.filepath, (path,), kind=IMAGE if image.source == "FILE" else "")
 
 
 def _numbered_file(datablock, is_sequence, numbers):
@@ -229,7 +237,7 @@ def _absolute(path, library):
 
 
 def _reader_of(file):
-    return _is_readable_image if file.is_image else _is_there
+    return {IMAGE: _is_readable_image, PROFILE: _is_readable_profile}.get(file.kind, _is_there)
 
 
 def _is_there(path):
@@ -238,15 +246,28 @@ def _is_there(path):
 
 
 def _is_readable_image(path):
-    """Whether a file exists and Blender can read it as an image."""
-    if not _is_there(path):
-        return False
-    with path.open("rb") as file:
-        head = file.read(16)
-    if head.startswith(_SIGNATURES):
-        return True
-    image = bpy.data.images.load(str(path))
+    """Whether a file exists and Blender can read all of it as an image."""
+    return _is_there(path) and _kept(path, _can_be_decoded)
+
+
+def _is_readable_profile(path):
+    """Whether a file exists and is a whole IES profile."""
+    return _is_there(path) and _kept(path, lambda path: whole_images.is_whole_ies(path.read_bytes()))
+
+
+def _kept(path, is_readable):
+    """Return is_readable(path), which is called again only if the file has changed."""
+    status = path.stat()
+    key = path, status.st_mtime_ns, status.st_size
+    return readable_cache.get(key, lambda: is_readable(path))
+
+
+def _can_be_decoded(path):
+    is_whole = whole_images.is_whole(path.read_bytes())
+    if is_whole is not None:
+        return is_whole
     try:
-        return min(image.size) > 0
-    finally:
-        bpy.data.images.remove(image)
+        imbuf.load(str(path)).free()
+    except (OSError, ValueError):
+        return False
+    return True

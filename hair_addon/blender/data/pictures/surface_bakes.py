@@ -95,17 +95,27 @@ def find(objects, override, frame, for_render, waits):
         elif uid not in paths and _needs_bake(one, override):
             paths[uid] = _path_of(one)
             originals[paths[uid]] = one.original  # linked objects have common pictures
-    files, errors = picture_jobs.files_of("surfaces", originals, waits, frame=float(frame), for_render=for_render)
-    for error in errors:
-        say(str(error))
     bake_cache.make_room(len(paths))
-    found, last = {}, picture_jobs.last_cache
-    for uid, path in (*paths.items(), *((uid, None) for uid in edited)):
-        made = files.get(path)
-        path = last.get(uid) if made is None else last.keep(uid, made)
-        if path is not None and path.is_file():
-            found[uid] = bake_cache.get(path, lambda path=path: _read(path))
-    return {uid: bake for uid, bake in found.items() if bake is not None}
+    shown = {**paths, **dict.fromkeys(edited)}
+
+    def read():
+        """Return {session_uid: `Bake`}; None for a render if a file was damaged."""
+        files, errors = picture_jobs.files_of("surfaces", originals, waits, frame=float(frame), for_render=for_render)
+        for error in errors:
+            say(str(error))
+        used = {uid: _used(uid, files.get(path)) for uid, path in shown.items()}
+        found = {uid: bake_cache.get(path, lambda path=path: _read(path)) for uid, path in used.items() if path}
+        whole = {uid: bake for uid, bake in found.items() if bake is not None}
+        return None if waits and len(whole) < len(found) else whole
+
+    return picture_jobs.read(read, waits)
+
+
+def _used(uid, made):
+    """Return the file of an object's pictures: `made`, or its last file if that is None; None without one."""
+    last = picture_jobs.last_cache
+    path = last.get(uid) if made is None else last.keep(uid, made)
+    return path if path is not None and path.is_file() else None
 
 
 def add_uv_map(mesh, name, uvs):
@@ -181,7 +191,7 @@ def _read(path):
 
 
 def _read_arrays(path):
-    with np.load(path) as found:
+    with path.open("rb") as file, np.load(file) as found:
         color, normal = found["color"], found["normal"]
         texels = np.concatenate([color, found["roughness"][..., None]], axis=-1).astype(np.float32)
         bent = None

@@ -96,8 +96,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         if self.is_animation or composite.is_in_sequence(blender_scene):
             frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
         frame_folders.require_readable([scene_time.frame_of(blender_scene)], blender_scene)
-        if bpy.app.background and _listener is no_progress:  # `io.pictures.frames` checks by itself
-            rendered_files.require(blender_scene.original, [scene_time.frame_of(blender_scene)])
+        if _listener is no_progress:  # `io.pictures.frames` checks by itself
+            self._check_files(blender_scene)
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
@@ -151,6 +151,15 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             composite.refuse(blender_scene, error_text(note))
             if not bpy.app.background:  # already printed to the console
                 self.report({"WARNING"}, error_text(note))
+
+    def _check_files(self, blender_scene):
+        """Refuse to render without files in the background. In a window, name the files. Raises `HairError`."""
+        wanted = blender_scene.original, [scene_time.frame_of(blender_scene)]
+        if bpy.app.background:
+            rendered_files.require(*wanted)
+        elif names := rendered_files.missing(*wanted):
+            sentence = "Files are missing or damaged: {names}; restore or relink them."
+            self.report({"WARNING"}, interface_text(sentence, names=rendered_files.in_short(names)))
 
     def _views(self, view_layer):
         """Names of the views of a stereo picture; the empty name for other pictures."""

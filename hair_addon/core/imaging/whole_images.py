@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether the bytes of an image file are complete, without decoding its pixels.
+
+Sources: PNG (ISO/IEC 15948), JPEG (ITU-T T.81, annex B), TIFF (revision 6.0), IES (ANSI/IESNA LM-63).
+"""
+
+import math
+import zlib
+
+_PNG, _JPEG, _TIFF = b"\x89PNG\r\n\x1a\n", b"\xff\xd8", (b"II*\0", b"MM\0*")
+
+# Tags of a TIFF file: offsets and byte counts of its strips, and of its tiles. Types of their values → bytes.
+_PARTS = (273, 279), (324, 325)
+_BYTES = {3: 2, 4: 4}
+_HEAD_OF_IES = 13  # numbers before the angles
+
+
+def is_whole(data: bytes) -> bool | None:
+    """Whether the data of an image file are complete; None if only decoding shows it.
+
+    Blender reads JPEG and TIFF files that end early, with gray or black instead of the rest.
+    """
+    if data.startswith(_PNG):
+        return _is_whole_png(data) or None  # readers accept some wrong checksums
+    if data.startswith(_JPEG):
+        return _is_whole_jpeg(data)
+    return _is_whole_tiff(data) if data.startswith(_TIFF) else None
+
+
+def is_whole_ies(data: bytes) -> bool:
+    """Whether an IES file has all candela values that its header announces."""
+    _head, found, rest = data.partition(b"TILT=")
+    tilt, _line, numbers = rest.partition(b"\n")
+    if not found or tilt.strip() != b"NONE":
+        return bool(found and numbers.strip())
+    try:
+        values = [float(number) for number in numbers.replace(b",", b" ").split()]
+        vertical, horizontal = int(values[3]), int(values[4])
+    except (ValueError, IndexError, OverflowError):
+        return False
+    return len(values) >= _HEAD_OF_IES + vertical + horizontal + vertical * horizontal
+
+
+def _is_whole_png(data):
+    """Whether all chunks up to the last have their checksums."""
+    place, view = len(_PNG), memoryview(data)
+    while place + 12 <= len(data):
+        end = place + 12 + int.from_bytes(data[place : place + 4], "big")
+        checked = view[place + 4 : end - 4]
+        if end > len(data) or zlib.crc32(checked) != int.from_bytes(data[end - 4 : end], "big"):
+            return False
+        if checked[:4] == b"IEND":
+            return True
+        place = end
+    return False
+
+
+def _is_whole_jpeg(data):
+    """Whether the end of the picture follows its first scan: a thumbnail before it has an end too."""
+    place = len(_JPEG)
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        if data[place + 1] == 0xDA:
+            return data.find(b"\xff\xd9", place) >= 0
+        is_fill = data[place + 1] == 0xFF
+        place += 1 if is_fill else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return False
+
+
+def _is_whole_tiff(data):
+    """Whether the strips or tiles of the first picture are within the data; None without their sizes."""
+    order = "little" if data.startswith(b"II") else "big"
+
+    def number(place, size):
+        return int.from_bytes(data[place : place + size], order)
+
+    directory = number(4, 4)
+    end = directory + 2 + 12 * number(directory, 2)
+    if not directory or directory + 2 > len(data) or end > len(data):
+        return False
+    tags = {number(place, 2): place for place in range(directory + 2, end, 12)}
+    for places, counts in _PARTS:
+        if places in tags and counts in tags:
+            starts, sizes = (_values(number, tags[tag], len(data)) for tag in (places, counts))
+            return all(start + size <= len(data) for start, size in zip(starts, sizes, strict=False))
+    return None
+
+
+def _values(number, entry, end):
+    """Return the values of a TIFF entry at a place; infinity if they are not within the data, which end at `end`.
+
+    number(place, size): reads one.
+    """
+    size, count = _BYTES.get(number(entry + 2, 2), 4), number(entry + 4, 4)
+    first = entry + 8 if size * count <= 4 else number(entry + 8, 4)
+    if first + size * count > end:
+        return [math.inf]
+    return [number(place, size) for place in range(first, first + size * count, size)]
