@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menu entries: Add ▸ Curve, File ▸ Import and Export, the menus of objects and curves, also on a right-click."""
+"""Menu entries: Add ▸ Curve, File ▸ Import and Export, the menus of objects and curves, also on a right-click.
+
+Blender's panel of Cavity gets a line.
+"""
 
 import bpy
 
@@ -175,6 +178,11 @@ def _in_export_menu(menu, context):
         menu.layout.operator("vellus.export_groom", text="Hair (.abc/.usd*/.hair/.data/.ply/.npz)")
 
 
+def _in_cavity_panel(panel, _context):
+    if any(datablock.vellus.kind == "HAIR" and datablock.vellus.is_drawn for datablock in bpy.data.hair_curves):
+        panel.layout.label(text=interface_text("Cavity changes meshes, not hair"), icon="INFO")
+
+
 def _in_import_menu(menu, context):
     if surface_of(context.object) is not None:
         menu.layout.operator(
@@ -191,13 +199,14 @@ _ENTRIES = (
     ("VIEW3D_MT_sculpt_curves", _in_curves_menu),
     ("VIEW3D_MT_edit_curves", _in_curves_menu),
     ("VIEW3D_MT_edit_curves_context_menu", _in_curves_menu),
+    ("VIEW3D_PT_shading_cavity", _in_cavity_panel),
 )
 
 CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_hair_pie, VELLUS_MT_unlocked_render, VELLUS_MT_refused_hair)
 
 
 def register():
-    """Extend Blender's menus."""
+    """Extend Blender's menus, and its panel of Cavity."""
     for menu, entry in _ENTRIES:
         getattr(bpy.types, menu).append(entry)
 

@@ -313,6 +313,15 @@ def test_a_right_click_offers_hair(hair, menu, active, entry):
         assert list(layout.drawn) == wanted
 
 
+def test_blenders_panel_of_cavity_says_that_hair_has_none(hair):
+    (ours,) = (f for f in bpy.types.VIEW3D_PT_shading_cavity.draw._draw_funcs if f.__module__ == menus.__name__)
+    for is_drawn in (True, False):
+        bpy.data.objects["Hair"].data.vellus.is_drawn = is_drawn
+        layout = Layout()
+        ours(SimpleNamespace(layout=layout), Context())
+        assert layout.texts == ["Cavity changes meshes, not hair"] * is_drawn
+
+
 @pytest.mark.parametrize("active", ["Hair", "Guides", "Sphere"])
 def test_the_pie_menu_offers_grooming(hair, active):
     """The pie menu has eight entries on hair, its guides and its surface, and one on a bare mesh; none elsewhere."""
