@@ -145,7 +145,7 @@ class StrandGenerator:
         )
         drawn = cached.on_gpu
         if _is_deformed(cached.pose):
-            rest = strand_textures.packed_texture(cached.points, drawn.row_strands)
+            rest, _bounds = strand_textures.packed_texture(cached.points, drawn.row_strands)
         else:
             rest, cached.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
         self.carrier = strand_carrier.new_carrier(

@@ -7,6 +7,7 @@
 //   array_t<vec3> points    (S, P) positions, contiguous
 //   int strand              index into the first axis
 //   array_t<vec2> texels    (S, P + 1), contiguous
+//   array_t<vec3> boxes     (S, 2) lowest and highest coordinates of each strand, contiguous
 //
 // Constants:
 //
@@ -19,7 +20,14 @@
   const float x = place[0], y = place[1], z = place[2];
   float range = 0.0f;
   float not_finite = 0.0f;  // NaN after the first non-finite coordinate
+  float low_x = x, low_y = y, low_z = z, high_x = x, high_y = y, high_z = z;
   for (int i = 1; i < point_count; ++i) {
+    low_x = place[3 * i] < low_x ? place[3 * i] : low_x;
+    low_y = place[3 * i + 1] < low_y ? place[3 * i + 1] : low_y;
+    low_z = place[3 * i + 2] < low_z ? place[3 * i + 2] : low_z;
+    high_x = place[3 * i] > high_x ? place[3 * i] : high_x;
+    high_y = place[3 * i + 1] > high_y ? place[3 * i + 1] : high_y;
+    high_z = place[3 * i + 2] > high_z ? place[3 * i + 2] : high_z;
     const float along_x = __builtin_fabsf(place[3 * i] - x);
     const float along_y = __builtin_fabsf(place[3 * i + 1] - y);
     const float along_z = __builtin_fabsf(place[3 * i + 2] - z);
@@ -28,6 +36,13 @@
     const float most = most_x > along_z ? most_x : along_z;
     range = most > range ? most : range;
   }
+  float* box = (float*)(boxes.data + (size_t)strand * 2);
+  box[0] = low_x;
+  box[1] = low_y;
+  box[2] = low_z;
+  box[3] = high_x;
+  box[4] = high_y;
+  box[5] = high_z;
   out[0] = x;
   out[1] = y;
   out[2] = z;

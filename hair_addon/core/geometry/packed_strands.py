@@ -22,14 +22,16 @@ _MIDDLE = MOST + 1
 
 
 @wp.func_native(native_code.body(__file__, "packed_strands.cpp", MOST=MOST))
-def _pack_strand(points: wp.array2d[wp.vec3], strand: int, texels: wp.array2d[wp.vec2]):  # type: ignore[empty-body]
-    """Write the texels of one strand."""
+def _pack_strand(  # type: ignore[empty-body]
+    points: wp.array2d[wp.vec3], strand: int, texels: wp.array2d[wp.vec2], boxes: wp.array2d[wp.vec3]
+):
+    """Write the texels and the box of one strand."""
 
 
 @wp.kernel
-def _pack(points: wp.array2d[wp.vec3], texels: wp.array2d[wp.vec2]):
+def _pack(points: wp.array2d[wp.vec3], texels: wp.array2d[wp.vec2], boxes: wp.array2d[wp.vec3]):
     strand = wp.tid()
-    _pack_strand(points, strand, texels)
+    _pack_strand(points, strand, texels, boxes)
 
 
 def texel_count(point_count: int) -> int:
@@ -37,20 +39,24 @@ def texel_count(point_count: int) -> int:
     return HEAD_TEXELS + point_count - 1
 
 
-def pack(points: np.ndarray, texels: np.ndarray) -> None:
-    """Write the texels of strands.
+def pack(points: np.ndarray, texels: np.ndarray) -> np.ndarray:
+    """Write the texels of strands; returns the lowest and highest coordinates of their points, (2, 3) float32.
 
     points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with non-finite coordinates are
-    non-finite after unpacking. Raises `HairError` if counts do not match.
+    non-finite after unpacking; the bounds of no strands are zero. Raises `HairError` if counts do not match.
     """
     strand_count, point_count, _xyz = points.shape
     if not strand_count:
-        return
+        return np.zeros((2, 3), np.float32)
     points = np.ascontiguousarray(points, np.float32)
     require_count("texels", texels.size, strand_count * texel_count(point_count) * 2)
     inputs = [Rows(wp.array(points, dtype=wp.vec3, device="cpu", copy=False))]
+    # A second pass over all points would take as long as packing.
+    boxes = np.empty((strand_count, 2, 3), np.float32)
     outputs = [wp.array(texels, dtype=wp.vec2, device="cpu", copy=False)]
+    outputs.append(wp.array(boxes, dtype=wp.vec3, device="cpu", copy=False))
     parallel.launch(_pack, strand_count, inputs, outputs, "cpu")
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 def unpack(texels: np.ndarray) -> np.ndarray:
