@@ -22,7 +22,7 @@ def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
     """Draw the scene's hair and meshes from its camera; returns (height, width, 4) float32.
 
     The picture is scene-linear and premultiplied, bottom row first; settings: fields of `PictureSettings` (width,
-    height, samples_per_side, is_transparent).
+    height, samples_per_side, is_transparent). Samples are filtered with the scene's Filter Size, as in renders.
 
     >>> api.draw(width=64, height=48).shape
     (48, 64, 4)

@@ -85,6 +85,7 @@ def scene_files(blender, tmp_path_factory):
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.vellus.multiple_scattering = "DUAL"
+    bpy.context.scene.render.filter_size = 0.0  # pixels contain only their own samples, also at edges
     bpy.ops.mesh.primitive_plane_add()
     bpy.ops.vellus.distribute_guides(guide_count=3)
     for made in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.hair_curves):

@@ -45,8 +45,9 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
         per_side = pixel_sampling.samples_per_side(sample_count, lens_passes or sample_count)
         pass_count = sample_count // per_side**2
     width, height = size = settings.width, settings.height
+    filter_width = pixel_sampling.FILTER_WINDOW * context.scene.render.filter_size
     largest = gpu.capabilities.max_texture_size_get()
-    if max(size) * per_side + 2 * film.BORDER > largest:
+    if max(size) * per_side + 2 * (film.BORDER + pixel_sampling.filter_margin(per_side, filter_width)) > largest:
         sentence = f"{width * per_side} × {height * per_side} samples exceed the graphics driver's {largest} a side"
         raise HairError(f"{sentence}: use fewer.")
     if drawn is None:
@@ -59,7 +60,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
     if drawn is None:
         drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     drawn = light_paths.with_grid(drawn, *camera, light_paths.path_count(context.scene, size))
-    picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
+    picture = film.Film(size, per_side, ("Combined",), settings.is_transparent, filter_width)
     for turn in range(pass_count):
         yield Stage("Drawing", 0.4 + 0.55 * turn / pass_count)
         with drawing.ALONE:

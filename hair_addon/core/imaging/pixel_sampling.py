@@ -91,6 +91,7 @@ class PictureSettings(Settings):
 DRAWING_FIELDS = ("samples_per_side",)  # only for pictures that are drawn at once
 FRAME_FIELDS = ("sample_count", "has_passes")  # only for rendered frames
 MOST_DRAWN = 16384  # pixels along a side of a picture that is drawn at once
+FILTER_WINDOW = 2.0  # width of the pixel filter in multiples of Blender's Filter Size, a radius in Cycles and EEVEE
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ SIZES = st.sampled_from([0.0, 1e-12, 2e-5, 0.01, 1.0, 1e6, 1e20])
     flat=st.tuples(*[st.booleans()] * 3),
 )
 def test_points_are_within_a_part_of_their_strand(seed, size, place, flat):
-    """Points are within 2^-20 of their strand's greatest offset, whatever other strands are packed; bounds are exact."""
+    """Points are within 2^-20 of their strand's greatest offset beside any other strands; bounds are exact."""
     points = strands(seed, size, place, flat)
     points[0, 1:] = points[0, :1]  # without length
     points[1, 1:] = points[1, :1] + 1000.0 * (points[1, 1:] - points[1, :1])

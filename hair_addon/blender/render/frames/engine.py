@@ -105,8 +105,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         wanted = _passes(view_layer, blender_scene.render.use_motion_blur)
         passes = [name for name in wanted if not mattes.is_matte(name)]
         labels = mattes.Labels(view_layer.pass_cryptomatte_depth) if len(passes) < len(wanted) else None
-        # The size is a radius: the windows of Cycles and EEVEE are twice as wide.
-        filter_width = 2.0 * blender_scene.render.filter_size
+        filter_width = pixel_sampling.FILTER_WINDOW * blender_scene.render.filter_size
         film_settings = passes, blender_scene.render.film_transparent, filter_width
         has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1

@@ -26,12 +26,12 @@ def offscreen_picture(width=96, height=72, samples_per_side=2):
     return offscreen.draw_picture(PictureSettings(width, height, samples_per_side, is_transparent=True))
 
 
-@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-def test_it_renders_the_offscreen_picture(lit, tmp_path, kind):
+@pytest.mark.parametrize(("kind", "filter_size"), [("PERSP", 0.0), ("ORTHO", 1.5)])
+def test_it_renders_the_offscreen_picture(lit, tmp_path, kind, filter_size):
     light_up()
     camera = bpy.context.scene.camera.data
     camera.type, camera.ortho_scale, camera.shift_x, camera.shift_y = kind, 4.0, 0.1, -0.05
-    combined = rendered(tmp_path, film_transparent=True, pixel_aspect_x=1.5)["Combined"]
+    combined = rendered(tmp_path, film_transparent=True, pixel_aspect_x=1.5, filter_size=filter_size)["Combined"]
     np.testing.assert_allclose(combined, offscreen_picture(), atol=1e-6)
     assert (combined[..., 3] > 0.5).mean() > 0.05
 
