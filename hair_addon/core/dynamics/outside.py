@@ -131,7 +131,7 @@ class Barrier:
         ]
         before, out = (parallel.empty_vectors((count, point_count), device) for _ in range(2))
         found = wp.empty(count, dtype=int, device=device)
-        parallel.launch(_keep_outside, count, inputs, [before, out, found], device, least_rows=256)
+        parallel.launch(_keep_outside, count, inputs, [before, out, found], device, least_rows=1024)
         found = found.numpy()
         if found.min() == _IS_NON_FINITE:
             raise HairError(_NON_FINITE)

@@ -34,6 +34,11 @@ def weigh(
     """Compute guides, weights and rotations of a strand. frames: (G, 8), tangent and normal of each guide."""
 
 
+@wp.func_native(native_code.body(__file__, "guide_lengths.cpp", WIDTH=NUMBERS))
+def sum_points(guide: int, guide_points: wp.array2d[wp.vec3], out_sums: wp.array2d[float]):
+    """Write the sum of unit vectors to points of a guide's lower half, and its length, to (G, 8) numbers."""
+
+
 @wp.func_native(native_code.body(__file__, "limit.cpp", WIDTH=NUMBERS))
 def limit(
     strand: int,

@@ -258,7 +258,6 @@ def limited(
         inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[shapes],
         device=device,
-        least_rows=1024,
     )
     weights = wp.empty_like(guide_weights.weights)
     parallel.launch(
@@ -363,13 +362,9 @@ def _shapes(
     tangent, bitangent = frame(normal)
     root = guide_points[guide, 0]
     last = guide_points.shape[1] - 1
-    half = (last + 1) / 2
-    lower = wp.vec3()
-    length = float(0.0)
-    for point in range(1, last + 1):
-        length += wp.length(guide_points[guide, point] - guide_points[guide, point - 1])
-        if point <= half:
-            lower += wp.normalize(guide_points[guide, point] - root)
+    cpu_weights.sum_points(guide, guide_points, out_shapes)
+    lower = wp.vec3(out_shapes[guide, 0], out_shapes[guide, 1], out_shapes[guide, 2])
+    length = out_shapes[guide, 6]
     tip = guide_points[guide, last] - root
     lower = wp.normalize(wp.vec3(wp.dot(tangent, lower), wp.dot(bitangent, lower), wp.dot(normal, lower)))
     tip = wp.normalize(wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip)))

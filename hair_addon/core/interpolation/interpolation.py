@@ -79,10 +79,9 @@ def interpolate(
     parallel.launch(
         _put_offsets,
         guide_count,
-        inputs=[Rows(guide_points), Rows(guide_normals), *((1, SEGMENTS) if on_cpu else (4, 1))],
+        inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[offsets, guide_rows],
         device=roots.device,
-        least_rows=1024,
     )
     threads = 1 if on_cpu else SEGMENTS
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
@@ -162,34 +161,28 @@ def _put_strands(
     )
 
 
-@wp.func
-def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, normal: wp.vec3):
-    """Offset of Eq. 7 to a point after the root, in the guide's frame, and its length; zero past the tip."""
-    tangent, bitangent = frame(normal)
-    if point >= guide_points.shape[1]:
-        return wp.vec4()
-    offset = guide_points[guide, point] - guide_points[guide, point - 1]
-    return wp.vec4(wp.dot(tangent, offset), wp.dot(bitangent, offset), wp.dot(normal, offset), wp.length(offset))
+@wp.func_native(native_code.body(__file__, "guide_offsets.cpp", WIDTH=SEGMENTS, SEGMENTS=SEGMENTS))
+def _frame_segments(
+    guide: int,
+    tangent: wp.vec3,
+    bitangent: wp.vec3,
+    normal: wp.vec3,
+    guide_points: wp.array2d[wp.vec3],
+    out_offsets: wp.array3d[float],
+) -> float: ...
 
 
 @wp.kernel
 def _put_offsets(
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
-    segment_stride: int,
-    part_stride: int,
     # outputs
     out_offsets: wp.array3d[float],
     out_rows: wp.array2d[float],
 ):
     guide = wp.tid()
-    length = float(0.0)
-    for group in range(out_offsets.shape[1]):
-        for lane in range(wp.static(SEGMENTS)):
-            offset = _framed_offset(guide_points, guide, 1 + wp.static(SEGMENTS) * group + lane, guide_normals[guide])
-            for part in range(4):
-                out_offsets[guide, group, segment_stride * lane + part_stride * part] = offset[part]
-            length += offset[3]
+    tangent, bitangent = frame(guide_normals[guide])
+    length = _frame_segments(guide, tangent, bitangent, guide_normals[guide], guide_points, out_offsets)
     for axis in range(3):
         out_rows[guide, axis] = guide_normals[guide][axis]
         out_rows[guide, 3 + axis] = guide_points[guide, 0][axis]
