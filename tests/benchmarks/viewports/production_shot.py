@@ -7,11 +7,14 @@ The sample head has 136,000 triangles, an armature and a shape key, 100,000 stra
 strands of brows and 200,000 of fuzz, two area lights and an HDRI. The view turns, the animation plays, or a slider of a
 style moves. Columns: Blender's evaluation with the handlers of the add-on, Blender's drawing, and drawing by Vellus,
 each measured until the GPU has finished. Rows named "twice" are without hidden hair: Blender evaluates and draws all
-strands too. `--small` tries the program without a GPU.
+strands too. `--parts` also prints the time of each stage, with a wait after it, and the functions that take the host's
+time. `--small` tries the program without a GPU.
 """
 
 import argparse
+import cProfile
 import os
+import pstats
 import sys
 import time
 from pathlib import Path
@@ -28,11 +31,17 @@ import hair_addon
 from blend_samples.heads import brows, head
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu.display_transform import DisplayTransform
+from hair_addon.blender.gpu.shadows import ShadowMaps
+from hair_addon.blender.gpu.strands.strand_bounds import StrandBounds
+from hair_addon.blender.gpu.strands.strand_carrier import StrandCarrier
+from hair_addon.blender.gpu.strands.strand_maker import StrandMaker
+from hair_addon.blender.gpu.strands.style_maker import StyleMaker
 from hair_addon.blender.groom import hidden_hair
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import hidden_previews, live_hair
-from hair_addon.blender.render import hair_cache
+from hair_addon.blender.render import drawn_scene, hair_cache, motion_vectors, scene_drawing
 from hair_addon.blender.render.viewport import hair_picture, viewport
+from hair_addon.blender.render.viewport.history import History
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.edit_guides import bend
@@ -41,6 +50,32 @@ from tests.benchmarks.viewports.crowd import TURN
 SIZE, FRAMES, STARTS = (1920, 1080), 24, 4  # measured frames; those before them compile and warm up
 STRANDS = {"hair": 100_000, "brows": 2_000, "fuzz": 200_000}
 MAY_HIDE = hidden_hair._may_hide_any
+
+# Stages whose time is measured without that of the stages within them.
+STAGES = {
+    "guides": (StrandMaker, "put_guides"),
+    "fill": (StrandMaker, "fill_some"),
+    "styles": (StyleMaker, "_style"),
+    "carry": (StrandCarrier, "carry"),
+    "bounds": (StrandBounds, "read"),
+    "pose": (hair_cache, "_pose_of"),
+    "hair read": (drawn_scene, "_read_hair"),
+    "meshes": (drawn_scene.drawn_meshes, "read_drawn_meshes"),
+    "upload": (drawn_scene, "_upload"),
+    "lamps": (drawn_scene, "_lamps_of"),
+    "maps": (ShadowMaps, "draw"),
+    "lit": (drawn_scene, "_lit"),
+    "world": (drawn_scene, "_renewed"),
+    "all of the world": (drawn_scene, "visibility"),
+    "scene": (viewport, "drawn_scene_of"),
+    "surfaces": (scene_drawing, "draw_hiding"),
+    "hair": (scene_drawing, "draw_hair"),
+    "sums": (hair_picture.HairPicture, "_accumulate"),
+    "motion": (motion_vectors, "draw"),
+    "history": (History, "add"),
+    "show": (hair_picture.HairPicture, "show"),
+    "vellus": (None, "draw_vellus"),
+}
 
 
 def build(strands):
@@ -190,10 +225,56 @@ def measure(window, hair, action, has_hair=True):
     return 1e3 * np.median(found[STARTS:], axis=0)
 
 
+def measure_stages(window, hair, action):
+    """Return {stage: median time [ms]} of Vellus after an action, each waited for, and without stages within it."""
+    found, real, stack = [], {}, []
+
+    def timed(name, work):
+        def call(*given, **named):
+            window.wait()
+            started, within = time.perf_counter(), 0.0
+            stack.append(within)
+            result = work(*given, **named)
+            window.wait()
+            taken = 1e3 * (time.perf_counter() - started)
+            found[-1][name] = found[-1].get(name, 0.0) + taken - stack.pop()
+            if stack:
+                stack[-1] += taken
+            return result
+
+        return call
+
+    for name, (owner, label) in STAGES.items():
+        owner = owner or window
+        real[name] = owner, label, getattr(owner, label)
+        setattr(owner, label, timed(name, real[name][2]))
+    for index in range(1, FRAMES + 1):
+        found.append({})
+        action(window, hair, index)
+        window.draw_vellus()
+    for owner, label, work in real.values():
+        setattr(owner, label, work)
+    return {name: float(np.median([one.get(name, 0.0) for one in found[STARTS:]])) for name in STAGES}
+
+
+def print_parts(window, hair, action):
+    """Print stages of an action, and the functions of the host that take the most time."""
+    shown = measure_stages(window, hair, action)
+    print("   ", "  ".join(f"{name} {value:.2f}" for name, value in shown.items() if value > 0.005), flush=True)
+    profile = cProfile.Profile()
+    for index in range(1, FRAMES + 1):
+        action(window, hair, index)
+        profile.enable()
+        window.draw_vellus()
+        profile.disable()
+    pstats.Stats(profile).strip_dirs().sort_stats("tottime").print_stats(24)
+
+
 def main():
     """Print a row for each mode of shading and each action."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--small", action="store_true", help="few strands, pixels and frames")
+    parser.add_argument("--parts", action="store_true", help="print the time of each stage too")
     parser.add_argument("--limit", type=float, default=200.0, help="seconds after which no row begins")
     parser.add_argument("--out", type=Path, help="folder for a picture of each mode of shading")
     options = parser.parse_args()
@@ -220,6 +301,7 @@ def main():
             hidden_hair._may_hide_any = MAY_HIDE if label == "once" else lambda: False
             window.space.show_object_viewport_curves = label != "none"
             hidden_previews.follow()
+            bpy.context.view_layer.update()
             viewport.invalidate()
             if shading == "SOLID" and label == "twice":
                 continue  # Solid shading does not draw hair that Vellus draws
@@ -229,6 +311,8 @@ def main():
                 times = measure(window, hair, action, label != "none")
                 shown = "".join(f"{value:11.1f}" for value in times)
                 print(f"{shading.lower():10} {label:8} {action.__name__:8}{shown}", flush=True)
+                if options.parts and label == "once":
+                    print_parts(window, hair, action)
             if options.out:
                 save(window.read(*size), options.out / f"{shading}_{label}.png".lower())
 
