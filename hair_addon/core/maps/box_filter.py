@@ -17,7 +17,7 @@ from . import uv_islands
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_LEAST_STRANDS = 16_384  # fewer are not worth a thread
+_LEAST_STRANDS = 8_192  # fewer are not worth a thread
 _TAPS = 4  # texels along each side that a strand's share touches at the level where its side is at most 3 texels
 
 
@@ -121,45 +121,53 @@ class Levels:
         while max(levels[-1].shape[:2]) > 1:
             levels.append(halved(levels[-1]))
         self.texels = np.concatenate([level.reshape(-1, pixels.shape[2]) for level in levels])
-        self._shapes = [level.shape for level in levels]
+        ends = np.cumsum([level.size // pixels.shape[2] for level in levels])
+        parts = np.split(self.texels, ends[:-1])
+        self._levels = [part.reshape(level.shape) for part, level in zip(parts, levels, strict=True)]
+        self._for_kernels = [_for_kernels(level) for level in self._levels]
 
     def follow(self, pixels: np.ndarray, changed: tuple[slice, slice] | None) -> None:
         """Replace the image by one of the same shape, and halve only changed texels; changed: from `changed_box`."""
         self.pixels = pixels
         if changed is None:
             return
-        ends = np.cumsum([height * width for height, width, _channels in self._shapes])
-        levels = [part.reshape(s) for part, s in zip(np.split(self.texels, ends[:-1]), self._shapes, strict=True)]
         rows, columns = changed
-        levels[0][rows, columns] = pixels[rows, columns]
-        for finer, level in itertools.pairwise(levels):
+        self._levels[0][rows, columns] = pixels[rows, columns]
+        for finer, level in itertools.pairwise(self._for_kernels):
             rows, columns = (slice(side.start // 2, (side.stop + 1) // 2) for side in (rows, columns))
-            _halve_into(
-                level[rows, columns], finer[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop]
-            )
+            _halve_box(finer, level, rows, columns)
 
 
 def halved(pixels: np.ndarray) -> np.ndarray:
     """Return the means of two by two texels of (H, W, C) float32; a last odd row or column stands alone."""
     height, width, channels = pixels.shape
     found = np.empty(((height + 1) // 2, (width + 1) // 2, channels), np.float32)
-    _halve_into(found, pixels)
+    _halve_box(_for_kernels(pixels), _for_kernels(found), slice(0, len(found)), slice(0, found.shape[1]))
     return found
 
 
-def _halve_into(found, pixels):
-    """Write the means of two by two float32 texels to `found`; both may be parts of larger arrays."""
-    source, target = (wp.array(values, dtype=float, ndim=3, device="cpu", copy=False) for values in (pixels, found))
-    kernel_cache.launch(_halve, dim=found.shape[:2], inputs=[source], outputs=[target], device="cpu")
+def _for_kernels(pixels):
+    return wp.array(pixels, dtype=float, ndim=3, device="cpu", copy=False)
+
+
+def _halve_box(finer, found, rows, columns):
+    """Write the means of two by two texels to some rows and columns of `found`."""
+    inputs = [finer, rows.start, columns.start]
+    size = rows.stop - rows.start, columns.stop - columns.start
+    kernel_cache.launch(_halve, dim=size, inputs=inputs, outputs=[found], device="cpu")
 
 
 @wp.kernel
 def _halve(
     finer: wp.array3d[float],
+    first_row: int,
+    first_column: int,
     # outputs
     out_means: wp.array3d[float],
 ):
     row, column = wp.tid()
+    row += first_row
+    column += first_column
     below = wp.min(2 * row + 1, finer.shape[0] - 1)
     right = wp.min(2 * column + 1, finer.shape[1] - 1)
     for channel in range(finer.shape[2]):

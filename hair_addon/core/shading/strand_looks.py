@@ -88,8 +88,11 @@ def strand_looks(look: Appearance, varied: Mapping[str, np.ndarray], randoms: np
     """
     count = len(randoms)
 
+    def given(name):
+        return np.asarray(varied.get(name, getattr(look, name)), float)
+
     def value(name):
-        found = np.asarray(varied.get(name, getattr(look, name)), float)
+        found = given(name)
         return found if name in varied else np.broadcast_to(found, (count, *found.shape))
 
     radial = value("radial_roughness").astype(np.float32).astype(float) if "radial_roughness" in varied else None
@@ -100,12 +103,12 @@ def strand_looks(look: Appearance, varied: Mapping[str, np.ndarray], randoms: np
         melanin = value("melanin")
         # pigment × `pigment_factor` is the pigment of the deviating melanin.
         root = sigma_a_from_melanin(melanin * deviation, value("redness"))
-        root = root + _dyes(value("tint"), falloff)
+        root = root + _dyes(given("tint"), falloff)
     elif look.parametrization == "COLOR":
         root = sigma_a_of_falloff(value("color"), falloff) * deviation[:, None]
     else:
         root = value("absorption") * deviation[:, None]
-    tip = root * value("tip_absorption")[:, None] + _dyes(value("tip_tint"), falloff)
+    tip = root * value("tip_absorption")[:, None] + _dyes(given("tip_tint"), falloff)
     factor = np.ones(count)
     if "roughness" in varied and look.roughness > 0.0:
         factor = value("roughness") / look.roughness
@@ -118,7 +121,7 @@ def strand_looks(look: Appearance, varied: Mapping[str, np.ndarray], randoms: np
 
 
 def _dyes(tints, falloff):
-    """Return sigma_a (S, 3) of dyes; zero for white."""
+    """Return sigma_a (S, 3) of dyes, or (3,) of one dye; zero for white."""
     return np.where(tints >= 1.0, 0.0, sigma_a_of_falloff(tints, falloff))
 
 
