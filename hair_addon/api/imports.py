@@ -21,6 +21,7 @@ from .arguments import are_arrays, changed, checked_progress, choice, curves_obj
 from .blender_access import blender
 
 if TYPE_CHECKING:
+    from ..blender.groom.foreign.hand_made_guides import HandMade
     from ..blender.groom.foreign.kept_hair import KeptHair
     from ..blender.groom.transfer.groom_transfers import TransferredGroom
     from ..blender.io.curve_files import Found
@@ -35,6 +36,7 @@ __all__ = [
     "DerivationSettings",
     "MeshStrandSettings",
     "TransferSettings",
+    "convert_particles",
     "import_curves",
     "import_groups",
     "mesh_to_hair",
@@ -136,6 +138,34 @@ def use_as_hair(
         guides_object=None if guides is None else curves_object_of(guides),
     )
     return run_now(work, progress)
+
+
+def convert_particles(
+    surface: MeshObject,
+    use: str = "HAIR",
+    settings: DerivationSettings | None = None,
+    *,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> "KeptHair | HandMade":
+    """Convert the hair of a mesh object's particle system, and switch the system off.
+
+    use: "HAIR" keeps the hairs as strands and derives guides from them, with `DerivationSettings` and changes by name;
+    "GUIDES" uses the hairs as guides and grows strands between them. Of several systems, the active one is converted,
+    or the first with hair. Child hairs are not converted. The result has `hair` and `guides`, the Curves. Blender
+    converts what is selected: afterwards only the mesh and the new object are. Raises `HairError`.
+
+    >>> scalp = bpy.data.objects["Scalp"]
+    >>> system = scalp.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system
+    >>> system.settings.type, system.settings.count = "HAIR", 300
+    >>> made = api.convert_particles(scalp, guide_count=20)
+    >>> len(made.hair.curves), len(made.guides.curves)
+    (300, 20)
+    """
+    choice(use, "use", ("HAIR", "GUIDES"))
+    wanted = changed(DerivationSettings, settings, changes)
+    mesh_object = blender.data.arguments.surface_object(surface)
+    return blender.groom.foreign.particle_hair.convert(mesh_object, use, wanted, checked_progress(progress))
 
 
 def mesh_to_hair(

@@ -37,6 +37,11 @@ def add_curves(parser):
         help="turn a mesh object of cards, tubes or solid locks in the input file into hair, with derived guides",
     )
     parser.add_argument(
+        "--from-particles",
+        choices=("HAIR", "GUIDES"),
+        help="use the surface's particle hair, without its children, as hair or as guides",
+    )
+    parser.add_argument(
         "--mesh-roots",
         choices=[value for value, *_ in _ROOT_ENDS],
         help="root ends of --from-mesh: nearest to the surface, or by the V coordinate [SURFACE]",
@@ -73,6 +78,8 @@ def checked(given):
         raise HairError("--guides-from and --hair-from exclude each other.")
     if given.from_mesh and came_from:
         raise HairError("--from-mesh excludes --guides-from and --hair-from.")
+    if given.from_particles and (came_from or given.from_mesh):
+        raise HairError("--from-particles excludes --guides-from, --hair-from and --from-mesh.")
     if (given.mesh_roots or given.fill_thickness) and not given.from_mesh:
         raise HairError("--mesh-roots and --fill-thickness need --from-mesh.")
     for name in ("object", "unit", "by_group"):
@@ -90,6 +97,11 @@ def checked(given):
     if given.up == "X" and blender.io.mesh_files.lacks_up_axis(given.input):
         raise HairError("--up X is not supported for a mesh file: use Y or Z.")
     return came_from
+
+
+def source(given):
+    """Return the file or the particle hair that curves come from, for messages."""
+    return given.guides_from or given.hair_from or "particle hair"
 
 
 def wanted(kind, given, file_axes):

@@ -54,10 +54,10 @@ def run(given, console):
         settings = options.changed_groom(replace(settings, appearance=look), given)
 
     came_from = curve_options.checked(given)
-    if given.from_library and (came_from or given.from_mesh or given.settings):
+    if given.from_library and (came_from or given.from_mesh or given.from_particles or given.settings):
         raise HairError(
-            "--from-library includes guides and settings: leave out --guides-from, --hair-from, --from-mesh and "
-            "--settings."
+            "--from-library includes guides and settings: leave out --guides-from, --hair-from, --from-mesh, "
+            "--from-particles and --settings."
         )
     if came_from:
         blender.io.curve_files.require_readable(came_from)
@@ -71,6 +71,10 @@ def run(given, console):
         systems = [_from_library(given, surface, console)]
     elif given.from_mesh:
         systems = [_of_mesh(given, surface, settings, console)]
+    elif given.from_particles:
+        with blender.groom.foreign.particle_hair.as_curves(surface) as made:
+            use = _follow_curves if given.from_particles == "GUIDES" else _keep_curves
+            systems = [use(given, surface, settings, blender.io.curve_files.Found(made), console)]
     elif came_from:
         use = _follow_curves if given.guides_from else _keep_curves
         with _curves_of("GUIDES" if given.guides_from else "HAIR", given, surface, file_axes, console) as groups:
@@ -140,7 +144,9 @@ def _from_library(given, surface, console):
 
 def _follow_curves(given, surface, settings, found, console):
     """Return (guides, hair) from the curves of a `Found`."""
-    _warn_of_useless(options.options_given(given, _OF_GUIDES), f"Guides come from {given.guides_from}", console)
+    _warn_of_useless(
+        options.options_given(given, _OF_GUIDES), f"Guides come from {curve_options.source(given)}", console
+    )
     work = blender.groom.transfer.groom_settings.using_as_guides(
         found.curves, surface, settings, blender.data.scene.present_depsgraph()
     )
@@ -157,7 +163,7 @@ def _keep_curves(given, surface, settings, found, console):
     """
     useless = options.options_given(given, _OF_GROWTH) + (["--style"] if given.styles else [])
     useless += ["--style-preset"] if given.style_preset else []
-    _warn_of_useless(useless, f"Hair is kept as it came from {given.hair_from}", console)
+    _warn_of_useless(useless, f"Hair is kept as it came from {curve_options.source(given)}", console)
     if found.guides is not None:
         counts = options.options_given(given, [("guide_count",)])
         _warn_of_useless(counts, f"Guides come from {given.hair_from} too", console)

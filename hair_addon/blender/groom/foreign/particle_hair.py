@@ -8,9 +8,13 @@ import bpy
 from bpy.types import Object, ParticleSystem
 
 from ....core.errors import HairError
-from ...data import whole_changes
+from ....core.grooming.derived_guides import DerivationSettings
+from ....core.grooming.groom import HairSettings
+from ....core.long_work import Progress, no_progress, run_now
+from ...data import scene, whole_changes
 from ...data.strands import curves, curves_objects
 from ...host.notices import name_of
+from . import hand_made_guides, kept_hair
 
 
 def systems_of(surface: Object | None) -> list[ParticleSystem]:
@@ -27,6 +31,21 @@ def system_to_convert(surface: Object) -> ParticleSystem:
         raise HairError('"{name}" has no particle system of hair.', name=name_of(surface))
     active = surface.particle_systems.active
     return next((system for system in found if system == active), found[0])
+
+
+def convert(
+    surface: Object, use: str, settings: DerivationSettings, progress: Progress = no_progress
+) -> kept_hair.KeptHair | hand_made_guides.HandMade:
+    """Convert a mesh object's particle hair to hair (use "HAIR") or to guides with hair between them ("GUIDES").
+
+    settings: of the guides of "HAIR". Raises `HairError` before anything changes.
+    """
+    with as_curves(surface) as made:
+        depsgraph = scene.present_depsgraph()
+        if use == "HAIR":
+            return run_now(kept_hair.using_as_hair(made, surface, depsgraph, settings), progress)
+        work = hand_made_guides.using_as_guides(made, surface, depsgraph, hair_settings=HairSettings())
+        return run_now(work, progress)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from ....core.grooming import cost
 from ....core.grooming.derived_guides import DerivationSettings
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.transfer_settings import TransferSettings
-from ....core.long_work import Stage, no_progress, run_now
+from ....core.long_work import Stage, no_progress
 from ... import io
 from ...data import scene
 from ...groom.foreign import foreign_meshes, hand_made_guides, joined_curves, kept_hair, particle_hair
@@ -321,14 +321,8 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
             setting_rows.row(self.layout, self.properties, "guide_count")
 
     def change(self, context):
-        surface = context.object
-        with particle_hair.as_curves(surface) as made:
-            depsgraph = scene.present_depsgraph()
-            if self.use == "HAIR":
-                settings = setting_properties.given_settings(self, DerivationSettings)
-                used = run_now(kept_hair.using_as_hair(made, surface, depsgraph, settings))
-            else:
-                used = hand_made_guides.use_as_guides(made, surface, depsgraph, hair_settings=HairSettings())
+        settings = setting_properties.given_settings(self, DerivationSettings)
+        used = particle_hair.convert(context.object, self.use, settings)
         context.view_layer.update()  # to include new objects
         shown = object_of(used.hair, context.view_layer)
         if shown is not None:

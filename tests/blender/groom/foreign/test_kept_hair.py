@@ -5,10 +5,13 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.render import read_strands
+from hair_addon.core.errors import HairError
+from tests.support.commands import run_here
 from tests.support.dynamics.following import update
 from tests.support.exchange.imported import curves_object, lines_on, select, stored, world
 
@@ -188,6 +191,26 @@ def test_particle_hair_is_converted_in_one_step(particles, use_as):
     np.testing.assert_allclose(world(kept), expected, atol=1e-6)
     assert (hair.data.vellus.kind, len(guides_of(hair).curves)) == ("HAIR", 12 if use_as == "HAIR" else 40)
     assert not (particles.modifiers[0].show_viewport or particles.modifiers[0].show_render)
+
+
+@pytest.mark.parametrize("use_as", ["HAIR", "GUIDES"])
+def test_scripts_and_the_command_line_convert_particle_hair(particles, tmp_path, use_as):
+    """The points are those of Blender's conversion, and the system is switched off."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"))
+    made = api.convert_particles(particles, use_as, guide_count=12)
+    kept = made.hair if use_as == "HAIR" else made.guides
+    expected = world(next(one for one in bpy.data.objects if one.data == kept))
+    assert not particles.modifiers[0].show_render and len(made.guides.curves) == (12 if use_as == "HAIR" else 40)
+    with pytest.raises(HairError, match="hidden"):
+        api.convert_particles(particles)
+    words = "groom", tmp_path / "head.blend", "--from-particles", use_as, "--guides", "12", "--out"
+    done = run_here(*words, tmp_path / "out.blend")
+    assert done.status == 0 and ("--guides has no effect" in done.errors) == (use_as == "GUIDES")
+    assert run_here(*words, tmp_path / "b.blend", "--from-mesh", "Cards").status == 1
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out.blend"))
+    (kept,) = [one for one in bpy.data.objects if one.type == "CURVES" and one.data.vellus.kind == use_as]
+    np.testing.assert_allclose(world(kept), expected, atol=1e-6)
+    assert not bpy.data.objects["Sphere"].modifiers[0].show_render
 
 
 @pytest.mark.parametrize("children", ["SIMPLE", "INTERPOLATED"])
