@@ -17,13 +17,17 @@ modified_cache = Cache()  # session_uid of an object → _Modified
 
 @dataclass
 class _Modified:
-    """The evaluated strands of an object; is_current: whether its evaluation has not been reported since."""
+    """The evaluated strands of an object; is_current: whether its evaluation has not been reported since.
+
+    spare: an array for the next radii, None before these are read.
+    """
 
     owner: int  # session_uid of the object
     datablock: int  # session_uid of its Curves
     arrays: tuple
     on_gpu: StrandsOnGPU
     is_current: bool = True
+    spare: np.ndarray | None = None
 
 
 def is_modified(hair_object: bpy.types.Object) -> bool:
@@ -39,16 +43,22 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     known = modified_cache.get(hair_object.session_uid)
     if known is not None and known.is_current:
         return known.on_gpu
-    read = read_strands.read(hair_object.evaluated_get(depsgraph).data)
+    evaluated = hair_object.evaluated_get(depsgraph).data
+    if known is None:
+        read, spare = read_strands.read(evaluated), None
+    else:
+        radii = known.arrays[1]
+        spare = np.empty(radii.shape, np.float32) if known.spare is None else known.spare
+        read = read_strands.read(evaluated, radii, spare)
     if known is not None and read_strands.are_same(read.arrays, known.arrays):
-        known.is_current = True
+        known.is_current, known.spare = True, spare
         return known.on_gpu
     forget_deleted()
     if known is not None and read_strands.have_same_details(read.arrays, known.arrays):
         on_gpu = strand_textures.with_points(known.on_gpu, read.points)
     else:
         on_gpu = strand_textures.upload_strands(*read.arrays)
-    made = _Modified(hair_object.session_uid, hair_object.data.session_uid, read.arrays, on_gpu)
+    made = _Modified(hair_object.session_uid, hair_object.data.session_uid, read.arrays, on_gpu, spare=spare)
     return modified_cache.keep(hair_object.session_uid, made).on_gpu
 
 

@@ -53,20 +53,24 @@ def _are_equal(values, others):
     """Whether arrays, or None, are equal; changed values usually differ everywhere, so a few are compared first."""
     if values is None or others is None or values.shape != others.shape:
         return values is others
+    if values.ctypes.data == others.ctypes.data and values.strides == others.strides:
+        return True  # the same memory
     some = slice(None, None, -(-len(values) // 100) or None)
     return np.array_equal(values[some], others[some]) and np.array_equal(values, others)
 
 
-def read(datablock: Any) -> ReadStrands:
+def read(datablock: Any, known_radii: np.ndarray | None = None, spare_radii: np.ndarray | None = None) -> ReadStrands:
     """Read the strands of stored or evaluated Curves; those with infinite or excessive coordinates are left out.
 
     A message about these is printed once per datablock. Curves with fewer points than the longest are resampled, and
-    Catmull-Rom splines to at least the point count of strands. Raises `HairError` if nothing can be drawn.
+    Catmull-Rom splines to at least the point count of strands. known_radii, spare_radii: of `curves.read_radii`. Raises
+    `HairError` if nothing can be drawn.
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
-    points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
+    points, randoms = curves.read_points(datablock), curves.read_randoms(datablock)
+    radii = curves.read_radii(datablock, known_radii, spare_radii)
     wetness, is_smooth, note = curves.read_wetness(datablock), attributes.are_smooth(datablock), None
     looks = strand_maps.read_looks(datablock)
     is_sound = _are_sound(points, counts)

@@ -18,23 +18,22 @@
   const float* place = (const float*)(points.data + (size_t)strand * point_count);
   float* out = (float*)(texels.data + (size_t)strand * (point_count + 1));
   const float x = place[0], y = place[1], z = place[2];
-  float range = 0.0f;
-  float not_finite = 0.0f;  // NaN after the first non-finite coordinate
   float low_x = x, low_y = y, low_z = z, high_x = x, high_y = y, high_z = z;
+  float not_finite = 0.0f * (x + y + z);  // NaN after the first non-finite coordinate
   for (int i = 1; i < point_count; ++i) {
-    low_x = place[3 * i] < low_x ? place[3 * i] : low_x;
-    low_y = place[3 * i + 1] < low_y ? place[3 * i + 1] : low_y;
-    low_z = place[3 * i + 2] < low_z ? place[3 * i + 2] : low_z;
-    high_x = place[3 * i] > high_x ? place[3 * i] : high_x;
-    high_y = place[3 * i + 1] > high_y ? place[3 * i + 1] : high_y;
-    high_z = place[3 * i + 2] > high_z ? place[3 * i + 2] : high_z;
-    const float along_x = __builtin_fabsf(place[3 * i] - x);
-    const float along_y = __builtin_fabsf(place[3 * i + 1] - y);
-    const float along_z = __builtin_fabsf(place[3 * i + 2] - z);
-    not_finite += 0.0f * (along_x + along_y + along_z);
-    const float most_x = along_x > along_y ? along_x : along_y;
-    const float most = most_x > along_z ? most_x : along_z;
-    range = most > range ? most : range;
+    const float point_x = place[3 * i], point_y = place[3 * i + 1], point_z = place[3 * i + 2];
+    not_finite += 0.0f * (point_x + point_y + point_z);
+    low_x = point_x < low_x ? point_x : low_x;
+    low_y = point_y < low_y ? point_y : low_y;
+    low_z = point_z < low_z ? point_z : low_z;
+    high_x = point_x > high_x ? point_x : high_x;
+    high_y = point_y > high_y ? point_y : high_y;
+    high_z = point_z > high_z ? point_z : high_z;
+  }
+  const float along[6] = {high_x - x, x - low_x, high_y - y, y - low_y, high_z - z, z - low_z};
+  float range = 0.0f;
+  for (int i = 0; i < 6; ++i) {
+    range = along[i] > range ? along[i] : range;
   }
   float* box = (float*)(boxes.data + (size_t)strand * 2);
   box[0] = low_x;

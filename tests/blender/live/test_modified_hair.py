@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.render import drawn_scene, modified_hair
 from tests.blender.live.test_carried_strands import bend
@@ -52,6 +53,18 @@ def test_viewports_draw_what_blender_evaluates_after_each_change(modified):
     assert abs(moved - bent).max() > 0.01
     modified.data.vellus.hair.seed += 1
     assert abs(is_evaluated(modified) - moved).max() > 0.01
+
+
+def test_radii_are_those_of_the_evaluation(modified):
+    """Radii that stay are read into an array that is reused; others are drawn."""
+    for turn, radius in enumerate((0.004, 0.004, 0.004, 0.006, 0.006)):
+        modified.data.vellus.hair.radius = radius
+        bend(modified.data.surface, 0.1 * turn)
+        drawn()
+        on_gpu = modified_hair.modified_cache.get(modified.session_uid).on_gpu
+        evaluated = modified.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        np.testing.assert_array_equal(on_gpu.radii.ravel(), curves.read_radii(evaluated.data))
+        assert on_gpu.radii.max() == np.float32(radius)
 
 
 def test_modifiers_may_change_the_number_of_strands(modified):

@@ -216,8 +216,16 @@ def read_points(curves):
     return positions
 
 
-def read_radii(curves):
-    """Return (all points,) float32 in local units, at least zero; Blender's default if curves have no radii."""
+def read_radii(curves, known=None, spare=None):
+    """Return (all points,) float32 in local units, at least zero; Blender's default if curves have no radii.
+
+    known: former radii, which are returned if nothing has changed; spare: an array of their size to read into, as new
+    memory takes five times as long.
+    """
+    if known is not None and known.size == len(curves.points) and attributes.has(curves, "radius", "FLOAT", "POINT"):
+        attributes.read_into(curves, "radius", "FLOAT", "POINT", spare)
+        if np.array_equal(spare.ravel(), known.ravel()):
+            return known.ravel()
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None:
         return np.full(len(curves.points), attributes.RADIUS, np.float32)
