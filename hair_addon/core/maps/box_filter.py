@@ -183,19 +183,20 @@ def _means(taps, levels):
     if size != tuple(taps.size):
         raise ValueError(f"pixels of size {size} at places for {taps.size}")
     require_indices("texels", taps.limits, len(texels))
-    sources, cells, weights, found = (
-        wp.array(values, dtype=kind, ndim=2, device="cpu", copy=False)
-        for values, kind in (
-            (texels, float),
-            (taps.texels, int),
-            (taps.weights, float),
-            (np.empty((len(taps.texels), texels.shape[1]), np.float32), float),
-        )
+    found = np.empty((len(taps.texels), texels.shape[1]), np.float32)
+    kernel, kind = (_weigh_colors, wp.vec4) if texels.shape[1] == 4 else (_weigh, float)
+    cells, weights = (
+        wp.array(values, dtype=its_kind, ndim=2, device="cpu", copy=False)
+        for values, its_kind in ((taps.texels, int), (taps.weights, float))
+    )
+    sources, means = (
+        wp.array(values, dtype=kind, ndim=1 if kind is wp.vec4 else 2, device="cpu", copy=False)
+        for values in (texels, found)
     )
     rows = [parallel.Rows(cells), parallel.Rows(weights)]
     options = {"device": "cpu", "least_rows": _LEAST_STRANDS}
-    parallel.launch(_weigh, len(taps.texels), inputs=[sources, *rows], outputs=[found], **options)
-    return found.numpy()
+    parallel.launch(kernel, len(found), inputs=[sources, *rows], outputs=[means], **options)
+    return found
 
 
 @wp.kernel
@@ -214,6 +215,23 @@ def _weigh(
         for tap in range(1, taps.shape[1]):
             total += weights[root, tap] * (texels[taps[root, tap], channel] - first)
         out_means[root, channel] = first + total
+
+
+@wp.kernel
+def _weigh_colors(
+    texels: wp.array[wp.vec4],
+    taps: wp.array2d[int],
+    weights: wp.array2d[float],
+    # outputs
+    out_means: wp.array[wp.vec4],
+):
+    """As `_weigh`, for four channels at once, in half of its time."""
+    root = wp.tid()
+    first = texels[taps[root, 0]]
+    total = wp.vec4()
+    for tap in range(1, taps.shape[1]):
+        total += weights[root, tap] * (texels[taps[root, tap]] - first)
+    out_means[root] = first + total
 
 
 def root_texels(

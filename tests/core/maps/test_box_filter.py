@@ -63,6 +63,9 @@ def test_means_follow_changes(rng, shape):
         levels.follow(image, changed)
         means = texels.follow(means, levels, changed)
         np.testing.assert_array_equal(means, texels.sample({None: image}))
+    for channel in range(shape[2]):  # colors have a kernel of their own
+        alone = texels.sample({None: np.ascontiguousarray(image[..., channel : channel + 1])})
+        np.testing.assert_array_equal(alone[:, 0], means[:, channel])
 
 
 def test_the_changed_box_holds_all_changes(rng):
