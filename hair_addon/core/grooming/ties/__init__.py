@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         cornrows,
         gather_settings,
         gathering,
+        raised_segments,
         tie_tails,
     )
 else:

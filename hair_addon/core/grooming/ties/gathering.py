@@ -21,7 +21,7 @@ from ...geometry.mesh import TriMesh
 from ...kernels import parallel
 from ...kernels.parallel import Rows
 from ..guide_shapes import joined, split, unit
-from . import buns, cornrows, tie_tails
+from . import buns, cornrows, raised_segments, tie_tails
 from .gather_settings import GatherSettings
 
 # No gradients are needed. Without fused multiply-add all devices round alike.
@@ -30,6 +30,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 _STEPS = 160  # of the longest way over the surface
 _TAIL_POINTS = 300
 _NEAR_ROOT = 1.5  # exponent of the spacing on the way to a braid: dense where hair rises, so that it stays outside
+_DEEP = 0.25  # depth of a segment below the surface, relative to the tie's radius, above which it is raised
 _BULGE = 0.25  # height of loose hair relative to its way
 
 
@@ -97,7 +98,7 @@ def _at_line(mesh, query, points, line, field, settings):
     if settings.shape == "BUN":
         return _in_bun(mesh, query, points, (ways, ranks), line, settings)
     if settings.shape == "CORNROWS":
-        return _in_row(points, (ways, ranks), cornrows.on_surface(query, mesh, line), settings)
+        return _in_row(mesh, query, points, (ways, ranks), cornrows.on_surface(query, mesh, line), settings)
     normal = mesh_math.normals(mesh, query.nearest(line[:1]))[0]
     if settings.shape in tie_tails.LOCKS:
         return _in_braid(points, (ways, ranks), line, normal, settings)
@@ -149,7 +150,7 @@ def _in_braid(points, ways_and_ranks, line, normal, settings):
     return after, locks, np.where(is_long, lengths, np.inf)
 
 
-def _in_row(points, ways_and_ranks, surface_below, settings):
+def _in_row(mesh, query, points, ways_and_ranks, surface_below, settings):
     """Return the result of `_at_line` for a cornrow: guides that reach the row end together."""
     (ways, ranks), (ground, normals) = ways_and_ranks, surface_below
     lengths, on_way, count = split(points)[1].sum(axis=1), _lengths(ways), points.shape[1] - 1
@@ -168,6 +169,7 @@ def _in_row(points, ways_and_ranks, surface_below, settings):
         before = points.shape[1] - len(left)
         way = np.concatenate([points[guide, :1], ways[guide, 1:], left[:1]])
         after[guide] = np.concatenate([_evenly(way[None], before + 1)[0], left[1:]])
+    after[is_long] = raised_segments.raised(mesh, query, after[is_long], _DEEP * settings.tie_radius)
     row_end = np.count_nonzero(row.places <= row.on_surface) - len(row.places)  # from the end
     ends = np.where(is_long, _lengths(after[:, : after.shape[1] + row_end]), np.inf)
     return after, locks, ends
