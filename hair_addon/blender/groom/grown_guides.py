@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Growing of guides, and draping if settings request it or hair is new."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,9 +56,10 @@ def grow(
     progress: Progress,
     roots: SurfacePoints | None = None,
     varied: VariedGuides | None = None,
+    random: Callable[[SurfacePoints], np.ndarray | None] | None = None,
 ) -> GrownGuides:
-    """Return the `GrownGuides` of completed settings; mask: (density, texture) and roots as in
-    `groom.distribute_guides`; flow: at rest; varied: by maps. Guides that cannot be draped keep their grown shape.
+    """Return the `GrownGuides` of completed settings; mask: (density, texture); roots and random as
+    in `groom.distribute_guides`; flow: at rest; varied: by maps. Guides that cannot be draped keep their grown shape.
     Raises `HairError`.
     """
     status = "" if varied is None else varied.status
@@ -77,6 +79,7 @@ def grow(
         lines=flow.parting,
         drawn_on=surface.drawn_on,
         varied=None if varied is None else varied.values,
+        random=random,
         device=device,
         progress=part_of(progress, 0.0, _GROWN) if settings.drape else progress,
     )

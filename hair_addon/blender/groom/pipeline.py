@@ -27,6 +27,7 @@ from ..data.strands import curves, drawn_lines, partings
 from ..data.surfaces import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
+from ..layers import carried_variation
 from ..settings import preferences, setting_properties, style_items
 from . import (
     bindings,
@@ -80,13 +81,17 @@ def distributing_guides(
     varied = varied_guides.read(target, surface_object, surface, settings)
     place, target, device = Remembered(surface_object), Remembered(target), preferences.device()
     shown = scene.shown_surface(surface_object, surface)
+    variation = carried_variation.read(target.find(), surface, settings.seed)
+    random = None if variation is None else variation.at
 
     def compute(progress):
         laid_flow = flow.at_rest(shown, surface, device)
-        return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots, varied)
+        return grown_guides.grow(surface, settings, mask, laid_flow, progress, roots, varied, random)
 
     grown = yield compute
-    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow.key, sized.fits)
+    guides = writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow.key, sized.fits)
+    carried_variation.write(guides, variation, grown.strands.roots)
+    return guides
 
 
 def interpolate_hair(

@@ -8,6 +8,7 @@ from ...core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         carried_layers,
+        carried_variation,
         recording,
     )
 else:

@@ -14,6 +14,7 @@ from ...core.geometry.strands import Strands
 from ...core.grooming import following, groom, guide_layers, layer_transfer
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.guide_layers import GuideLayers
+from ...core.interpolation.hair_binding import HairBinding
 from ..data import scene
 from ..data.strands import attributes, curves, gathered_groups, layer_attributes, partings
 from ..data.surfaces import Surface
@@ -92,6 +93,26 @@ def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLaye
     recording.show_layers(guides, joined)
 
 
+def binding_of(
+    surface: Surface, before: LayersBefore, roots: SurfacePoints, guides: Strands | None = None
+) -> HairBinding:
+    """Return the `HairBinding` at `roots` to guides, as of strands; guides: None for those before."""
+    own = strands.from_numpy(before.guides.numpy(), before.guides.roots, "cpu") if guides is None else guides
+    regions = before.parting.regions
+    if guides is not None:
+        regions = tuple(region for region in regions if region.guides is None)  # numbers of the guides before
+    return groom.bind_hair(
+        surface.mesh,
+        own,
+        before.settings,
+        regions=regions,
+        lines=before.parting.lines,
+        drawn_on=surface.drawn_on,
+        roots=roots,
+        is_mirrored=surface.has_flipped_winding,
+    )
+
+
 def _carried(surface, before, roots, bare):
     """Return (layers of guides `bare` at M roots, taken from the guides around them; the nearest guides (M,)).
 
@@ -102,17 +123,8 @@ def _carried(surface, before, roots, bare):
         indices = np.arange(len(roots), dtype=np.int32)[:, None]
         weights, apart = np.ones(indices.shape), np.zeros(len(roots))
         return layer_transfer.transferred(before.layers, bare, indices, weights, apart), indices[:, 0]
+    binding = binding_of(surface, before, roots)
     guides = strands.from_numpy(before.guides.numpy(), own, "cpu")
-    binding = groom.bind_hair(
-        surface.mesh,
-        guides,
-        before.settings,
-        regions=before.parting.regions,
-        lines=before.parting.lines,
-        drawn_on=surface.drawn_on,
-        roots=roots,
-        is_mirrored=surface.has_flipped_winding,
-    )
     indices, weights = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
     nearest = np.maximum(indices[:, 0], 0)
     first = mesh_math.positions(surface.mesh, own)[nearest]

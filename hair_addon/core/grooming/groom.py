@@ -267,6 +267,7 @@ def distribute_guides(
     lines: np.ndarray | None = None,
     drawn_on: np.ndarray | None = None,
     varied: Callable[[SurfacePoints], Mapping[str, np.ndarray]] | None = None,
+    random: Callable[[SurfacePoints], np.ndarray | None] | None = None,
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
@@ -276,10 +277,11 @@ def distribute_guides(
     density: (V,) of vertices, at least 0, None for uniform; texture: `Texture` that is multiplied with it, or None;
     mirror: for symmetric guides; shape: `TriMesh` of which `mesh` is a rotated and uniformly scaled copy, mirrored
     across the X axis: guides are placed on it, and thus in the same places for any rotation and scale, None for `mesh`;
-    roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines,
-    lines: of part lines, across which guides do not follow flow lines, and drawn_on (V, 3): as lines and drawn_on of
-    `bind_hair`; varied: returns {setting: (G,)} for guides at roots (G), in place of settings in `VARIED`, or None;
-    progress(step, part): callback, may raise to cancel. Raises `HairError`.
+    roots: existing `SurfacePoints` of guides, None to place them; flow: (L, 2, 3) segments [m] of flow lines, lines: of
+    part lines, across which guides do not follow flow lines, and drawn_on (V, 3): as lines and drawn_on of `bind_hair`;
+    varied: returns {setting: (G,)} for guides at roots (G), in place of settings in `VARIED`, or None; random: returns
+    the random numbers of `guide_growth.grow`, or None; progress(step, part): callback, may raise to cancel. Raises
+    `HairError`.
     """
     check_mesh(mesh)
     load_kernels(device, part_of(progress, 0.0, 0.1))
@@ -313,6 +315,7 @@ def distribute_guides(
         mesh,
         roots,
         length_variation=settings.length_variation,
+        random=None if random is None else random(roots),
         flow=laid_flow,
         is_draped=settings.drape,
         seed=settings.seed,

@@ -36,6 +36,7 @@ def grow(
     gravity: float | np.ndarray,
     seed: int,
     control_point_count: int,
+    random: np.ndarray | None = None,
     flow: flow_lines.FlowLines | None = None,
     is_draped: bool = False,
     lift: float | np.ndarray = 0.5 * np.pi,
@@ -45,12 +46,14 @@ def grow(
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
     largest random angle to the initial direction, which is the smooth normal without flow and is_draped; gravity in
-    [0, 1]: 0 for none, at 1 tips point nearly straight down (-Z); flow: lines along which guides start, at the angle
+    [0, 1]: 0 for none, at 1 tips point nearly straight down (-Z); random: (G, 3) as `random_numbers`, None for those of
+    the seed; flow: lines along which guides start, at the angle
     lift [rad] to the surface, or None; is_draped: whether guides fall after growth; without flow they start downhill at
     the same angle (`downhill`). Length, tilt, gravity and lift may be arrays (G,), a value for each guide. Guides bend
     with constant length, and slide over the surface instead of entering it.
     """
-    random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
+    if random is None:
+        random = random_numbers(seed, len(roots))
     root_normals = normals(mesh, roots)
     lengths = length * (1.0 + length_variation * (2.0 * random[:, 0] - 1.0))
     axes, rises = root_normals, np.full(len(roots), RISE)
@@ -81,6 +84,25 @@ def grow(
     # The curve interpolates the arc, so that it is neither shorter nor closer to the surface.
     abscissae = greville_abscissae(control_point_count)
     return controls_through(_along(path.numpy(), abscissae))
+
+
+def random_numbers(seed: int, count: int) -> np.ndarray:
+    """Return (G, 3) random numbers in [0, 1) of guides: of their lengths, and of angle and direction of their tilts."""
+    return np.random.Generator(np.random.PCG64(seed)).random((count, 3))
+
+
+def carried(numbers: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return random numbers (M, 3) of guides between others with numbers (G, 3), so that their hair stays as it is.
+
+    indices (M, k): guides that these follow, -1 for none, with weights (M, k). Tilts are averaged as vectors.
+    """
+    shares = np.where(indices >= 0, weights, 0.0).astype(np.float64)
+    shares[shares.sum(axis=1) <= 0.0, 0] = 1.0
+    shares /= shares.sum(axis=1, keepdims=True)
+    size, turn = np.sqrt(numbers[:, 1]), 2.0 * np.pi * numbers[:, 2]
+    values = np.stack([numbers[:, 0], size * np.cos(turn), size * np.sin(turn)], axis=1)
+    length, x, y = np.einsum("mk,mki->im", shares, values[np.maximum(indices, 0)])
+    return np.stack([length, np.minimum(x**2 + y**2, 1.0), np.arctan2(y, x) / (2.0 * np.pi) % 1.0], axis=1)
 
 
 def downhill(root_normals: np.ndarray, lift: float | np.ndarray, gravity: float | np.ndarray) -> np.ndarray:

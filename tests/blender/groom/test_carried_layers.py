@@ -264,3 +264,35 @@ def test_guides_are_grown_once_if_they_are_tagged_meanwhile(layered, monkeypatch
     layered.data.vellus.guides.length = 0.7
     update()
     assert grown == [layered.data.name]
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_random_variation_of_layered_guides_stays_on_the_surface(hair, mirror):
+    """With twice and four times the guides, strands stay where they are; back again, and with another seed, too."""
+    guides, strands = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides.data.surface.matrix_world = Matrix.Diagonal((mirror, 1.0, 1.0, 1.0))
+    settings = guides.data.vellus.guides
+    settings.tilt, settings.length_variation, settings.gravity = 0.3, 0.2, 0.0
+    grown = []
+    for count in (120, 60, 120, 60):
+        settings.guide_count = count
+        update()
+        grown.append(points(guides))
+    plain, fresh = grown[:2]
+    before = points(strands)
+    np.testing.assert_array_equal(points(guides), fresh)  # without layers, settings determine guides
+    api.add_layer(guides)
+    update()
+    for count in (120, 240, 60):
+        settings.guide_count = count
+        update()
+        assert len(guides.data.curves) == count
+        apart = np.linalg.norm(points(strands) - before, axis=2).mean(axis=1) / lengths(before)
+        assert np.median(apart) < 0.04 and (apart < 0.05).mean() > 0.7
+    np.testing.assert_array_equal(points(guides), fresh)
+    settings.guide_count = 120
+    settings.seed += 1
+    update()
+    settings.seed -= 1
+    update()
+    np.testing.assert_allclose(points(guides), plain, atol=1e-5)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random variation of guides with layers, which stays where it is on the surface when their number changes.
+
+Growth draws random lengths and tilts by the index of a guide. With another number of guides, these would be new ones:
+hair would change although its combing has not. So guides remember the roots of the guides whose variation they have.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from bpy.types import Curves
+
+from ...core import geometry, grooming
+from ...core.geometry import mesh as mesh_math
+from ...core.geometry import strands
+from ...core.geometry.mesh import SurfacePoints
+from ..data.strands import layer_attributes
+from ..data.surfaces import Surface
+from . import carried_layers
+from .carried_layers import LayersBefore
+
+_NAME = "vellus_variation"  # custom property of guides: {"seed": int, "roots": flat (G, 3) places in the bounding box}
+_SAME = 1e-4  # distance of the same roots, relative to the surface's extent
+
+
+@dataclass(frozen=True)
+class CarriedVariation:
+    """Variation of a seed at roots (G, 3), relative to the bounding box of a surface."""
+
+    surface: Surface
+    before: LayersBefore
+    seed: int
+    roots: np.ndarray
+
+    def at(self, roots: SurfacePoints) -> np.ndarray | None:
+        """Return the random numbers (M, 3) of guides at M roots; None for those of the seed, at the same roots."""
+        if self.is_at(roots):
+            return None
+        mesh = self.surface.mesh
+        low, size = _box(mesh)
+        own = geometry.closest_point.SurfaceQuery(mesh).nearest((low + size * self.roots).astype(np.float32))
+        places = np.stack([mesh_math.positions(mesh, own)] * 2, axis=1)
+        binding = carried_layers.binding_of(
+            self.surface, self.before, roots, strands.from_numpy(places.astype(np.float32), own, "cpu")
+        )
+        weights = binding.guide_weights
+        numbers = grooming.guide_growth.random_numbers(self.seed, len(self.roots))
+        return grooming.guide_growth.carried(numbers, weights.indices.numpy(), weights.weights.numpy())
+
+    def is_at(self, roots: SurfacePoints) -> bool:
+        """Whether guides at some roots are those that the variation comes from."""
+        if len(roots) != len(self.roots):
+            return False
+        apart = _relative(self.surface.mesh, roots) - self.roots
+        return bool(np.abs(apart).max(initial=0.0) <= _SAME)
+
+
+def read(guides: Curves | None, surface: Surface, seed: int) -> CarriedVariation | None:
+    """Return the `CarriedVariation` of guides on a `Surface`; None without layers, and for guides of another seed."""
+    if guides is None or not guides.vellus.is_base_grown or not layer_attributes.has_base(guides):
+        return None
+    before = carried_layers.read(guides, surface)
+    if before is None:
+        return None
+    stored = guides.get(_NAME)
+    if stored is None:
+        return CarriedVariation(surface, before, seed, _relative(surface.mesh, before.guides.roots))
+    try:
+        stored_seed, roots = stored["seed"], np.array(stored["roots"], np.float64).reshape(-1, 3)
+    except (KeyError, TypeError, ValueError, IndexError):  # of a damaged file
+        return None
+    if stored_seed != seed or not len(roots) or not np.isfinite(roots).all():
+        return None
+    return CarriedVariation(surface, before, seed, roots)
+
+
+def write(guides: Curves, variation: CarriedVariation | None, roots: SurfacePoints) -> None:
+    """Remember where the variation of guides that were grown at `roots` comes from; None for their own."""
+    if variation is not None and not variation.is_at(roots):
+        guides[_NAME] = {"seed": variation.seed, "roots": variation.roots.ravel().tolist()}
+    elif _NAME in guides:
+        del guides[_NAME]
+
+
+def _relative(mesh, roots):
+    low, size = _box(mesh)
+    return (mesh_math.positions(mesh, roots) - low) / size
+
+
+def _box(mesh):
+    """Return the lowest corner (3,) and the largest side [m] of a mesh's bounding box."""
+    low = mesh.vertices.min(axis=0).astype(np.float64)
+    return low, float((mesh.vertices.max(axis=0) - low).max())
