@@ -70,7 +70,7 @@ class Surface:
         """Return local coordinates (..., 3) as float32 in this space."""
         return transformed(positions, self.to_world_axes)
 
-    @property
+    @cached_property
     def is_deformed(self):
         """Whether shape keys or modifiers deform the mesh."""
         return not np.array_equal(self.rest, self.posed)

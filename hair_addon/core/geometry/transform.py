@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linear transforms of strands, and rotations about their roots."""
+"""Linear transforms of strands."""
 
 import numpy as np
 import warp as wp
@@ -40,37 +40,4 @@ def transformed(points: np.ndarray, matrix: np.ndarray, out: np.ndarray | None =
         moved = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
     matrix = wp.mat33(*np.asarray(matrix, np.float32).ravel().tolist())
     parallel.launch(_transform, len(points), inputs=[Rows(source), matrix], outputs=[moved], device="cpu")
-    return moved.numpy()
-
-
-@wp.kernel
-def _turn(
-    points: wp.array2d[wp.vec3],
-    rotations: wp.array[wp.mat33d],
-    is_turned: wp.array[wp.bool],
-    # outputs
-    out_points: wp.array2d[wp.vec3],
-):
-    strand = wp.tid()
-    root = wp.vec3d(points[strand, 0])
-    for point in range(points.shape[1]):
-        place = points[strand, point]
-        if is_turned[strand]:
-            place = wp.vec3(root + rotations[strand] * (wp.vec3d(place) - root))
-        out_points[strand, point] = place
-
-
-def turned_about_roots(points: np.ndarray, rotations: np.ndarray, is_turned: np.ndarray) -> np.ndarray:
-    """Return points (S, P, 3) float32 of strands rotated about their first points by matrices (S, 3, 3).
-
-    is_turned: (S,) bool; other strands keep their bits.
-    """
-    if not points.size:
-        return points
-    source = wp.array(np.ascontiguousarray(points, np.float32), dtype=wp.vec3, device="cpu", copy=False)
-    matrices = wp.array(np.ascontiguousarray(rotations, np.float64), dtype=wp.mat33d, device="cpu", copy=False)
-    flags = wp.array(np.ascontiguousarray(is_turned, bool), dtype=wp.bool, device="cpu", copy=False)
-    moved = parallel.empty_vectors(source.shape, "cpu")
-    inputs = [Rows(source), Rows(matrices), Rows(flags)]
-    parallel.launch(_turn, len(points), inputs=inputs, outputs=[moved], device="cpu")
     return moved.numpy()

@@ -7,15 +7,21 @@ length, so that a slow mouse and a fast one have the same effect.
 """
 
 import numpy as np
+import warp as wp
 
-from ..geometry.transform import turned_about_roots
-from .guide_shapes import turned, unit
+from ..kernels import parallel
+from ..kernels.parallel import Rows
+from .guide_shapes import unit
 from .guide_tool_settings import FlowSettings
+
+# No gradients are needed. Without fused multiply-add all devices round alike.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _PACE = 0.5  # length of a stroke with its full effect, relative to the radius
 _PIECE = 0.125  # length of the longest pieces, relative to the radius
+_LEANING = wp.constant(wp.float64(0.2))  # sine of the angle to the normal above which guides have their own direction
+_LEAST_SINE = wp.constant(wp.float64(1e-9))  # of an angle: smaller than the rounding of single precision
 _FACING = 0.5  # cosine between the normals of root and stroke from which the effect is full
-_LEANING = 0.2  # sine of the angle to the normal above which a guide has a direction of its own
 
 
 class PaintedFlow:
@@ -73,35 +79,21 @@ def turned_along(
     points (S, P, 3) [m]; normals (S, 3) and flow (S, 3): unit, at the roots. Segments keep their lengths; guides
     without share or length, and those without a direction, keep their bits.
     """
-    normals = np.asarray(normals, np.float64)
-    flow = unit(flow - np.sum(flow * normals, axis=1, keepdims=True) * normals)
-    lean = unit(np.subtract(points[:, -1], points[:, 0], dtype=np.float64))
-    shares = np.where(lean.any(axis=1) & flow.any(axis=1), np.asarray(shares, np.float64), 0.0)
-    # Turn about the normal, if the guide leans to a side.
-    height = np.clip(np.sum(lean * normals, axis=1), -1.0, 1.0)
-    side = lean - height[:, None] * normals
-    leaning = _smoothstep(np.linalg.norm(side, axis=1) / _LEANING)
-    azimuth = np.arctan2(np.sum(normals * np.cross(side, flow), axis=1), np.sum(side * flow, axis=1))
-    around = _rotations(normals, leaning * shares * azimuth)
-    lean = np.einsum("sij,sj->si", around, lean)
-    # Turn toward the surface, if the guide is steeper than the lift.
-    side = unit(lean - height[:, None] * normals)
-    ahead = unit(leaning[:, None] * side + (1.0 - leaning[:, None]) * flow)
-    rise = np.minimum(np.arcsin(height), settings.lift)[:, None]
-    aim = np.cos(rise) * ahead + np.sin(rise) * normals
-    reached = turned(lean, aim, shares)
-    axis = np.cross(lean, reached)
-    down = _rotations(unit(axis), np.arctan2(np.linalg.norm(axis, axis=1), np.sum(lean * reached, axis=1)))
-    return turned_about_roots(points, down @ around, shares > 0.0)
+    if not points.size:
+        return points
 
+    def there(values, kind, scalar):
+        return wp.array(np.ascontiguousarray(values, scalar), dtype=kind, device="cpu", copy=False)
 
-def _rotations(axes, angles):
-    """Return rotations (N, 3, 3) about unit axes (N, 3) by angles (N,) [rad]; the identity about a zero axis."""
-    cross = np.zeros((len(axes), 3, 3))
-    for row, column, part, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
-        cross[:, row, column], cross[:, column, row] = sign * axes[:, part], -sign * axes[:, part]
-    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+    source, turned = there(points, wp.vec3, np.float32), parallel.empty_vectors(points.shape[:2], "cpu")
+    inputs = [
+        Rows(source),
+        *(Rows(there(vectors, wp.vec3d, np.float64)) for vectors in (normals, flow)),
+        Rows(there(shares, wp.float64, np.float64)),
+        wp.float64(settings.lift),
+    ]
+    parallel.launch(_turn, len(points), inputs, [turned], "cpu", least_rows=1024)
+    return turned.numpy()
 
 
 def _pieces_near(places, reach, count):
@@ -118,3 +110,89 @@ def _pieces_near(places, reach, count):
 def _smoothstep(x):
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3.0 - 2.0 * x)
+
+
+@wp.func
+def _unit_of(vector: wp.vec3d):
+    size = wp.length(vector)
+    if size > wp.float64(0.0):
+        return vector / size
+    return wp.vec3d()
+
+
+@wp.func
+def _across(direction: wp.vec3d):
+    """Return a unit vector perpendicular to a unit vector."""
+    axis = wp.vec3d(wp.float64(1.0), wp.float64(0.0), wp.float64(0.0))
+    if wp.abs(direction[1]) < wp.abs(direction[0]) and wp.abs(direction[1]) <= wp.abs(direction[2]):
+        axis = wp.vec3d(wp.float64(0.0), wp.float64(1.0), wp.float64(0.0))
+    elif wp.abs(direction[2]) < wp.abs(direction[0]):
+        axis = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
+    return _unit_of(wp.cross(direction, axis))
+
+
+@wp.func
+def _turned(direction: wp.vec3d, target: wp.vec3d, share: wp.float64):
+    """As `guide_shapes.turned`, for one direction."""
+    cosine = wp.clamp(wp.dot(direction, target), wp.float64(-1.0), wp.float64(1.0))
+    aside = target - cosine * direction
+    sine = wp.length(aside)
+    if sine >= _LEAST_SINE:
+        aside = aside / sine
+    elif cosine < wp.float64(0.0):
+        aside = _across(direction)
+    else:
+        return direction
+    angle = share * wp.atan2(sine, cosine)
+    return wp.cos(angle) * direction + wp.sin(angle) * aside
+
+
+@wp.func
+def _rotation(axis: wp.vec3d, angle: wp.float64):
+    """Return the rotation about a unit axis; the identity about a zero axis."""
+    cross = wp.skew(axis)
+    return (
+        wp.identity(n=3, dtype=wp.float64) + wp.sin(angle) * cross + (wp.float64(1.0) - wp.cos(angle)) * cross * cross
+    )
+
+
+@wp.kernel
+def _turn(
+    points: wp.array2d[wp.vec3],
+    normals: wp.array[wp.vec3d],
+    flow: wp.array[wp.vec3d],
+    shares: wp.array[wp.float64],
+    lift: wp.float64,
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    one = wp.float64(1.0)
+    count, share, normal = points.shape[1], shares[guide], normals[guide]
+    root = wp.vec3d(points[guide, 0])
+    ahead_of = _unit_of(flow[guide] - wp.dot(flow[guide], normal) * normal)
+    lean = _unit_of(wp.vec3d(points[guide, count - 1]) - root)
+    is_turned = share > wp.float64(0.0) and wp.dot(lean, lean) > wp.float64(0.5)
+    is_turned = is_turned and wp.dot(ahead_of, ahead_of) > wp.float64(0.5)
+    rotation = wp.identity(n=3, dtype=wp.float64)
+    if is_turned:
+        # Turn about the normal, if the guide leans to a side.
+        height = wp.clamp(wp.dot(lean, normal), -one, one)
+        side = lean - height * normal
+        leaning = wp.clamp(wp.length(side) / _LEANING, wp.float64(0.0), one)
+        leaning = leaning * leaning * (wp.float64(3.0) - wp.float64(2.0) * leaning)
+        azimuth = wp.atan2(wp.dot(normal, wp.cross(side, ahead_of)), wp.dot(side, ahead_of))
+        around = _rotation(normal, leaning * share * azimuth)
+        lean = around * lean
+        # Turn toward the surface, if the guide is steeper than the lift.
+        side = _unit_of(lean - height * normal)
+        ahead = _unit_of(leaning * side + (one - leaning) * ahead_of)
+        rise = wp.min(wp.asin(height), lift)
+        reached = _turned(lean, wp.cos(rise) * ahead + wp.sin(rise) * normal, share)
+        axis = wp.cross(lean, reached)
+        rotation = _rotation(_unit_of(axis), wp.atan2(wp.length(axis), wp.dot(lean, reached))) * around
+    for point in range(count):
+        place = points[guide, point]
+        if is_turned:
+            place = wp.vec3(root + rotation * (wp.vec3d(place) - root))
+        out_points[guide, point] = place

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from hair_addon.core.geometry.transform import transformed, turned_about_roots
+from hair_addon.core.geometry.transform import transformed
 
 
 def test_strands_are_multiplied_by_the_matrix(rng):
@@ -32,14 +32,3 @@ def test_points_may_be_replaced(rng):
     expected = transformed(points, matrix)
     assert np.shares_memory(transformed(points, matrix, out=points), points)
     np.testing.assert_array_equal(points, expected)
-
-
-def test_strands_turn_about_their_roots(rng):
-    points, is_turned = 10.0 + rng.random((900, 7, 3), np.float32), rng.random(900) < 0.7
-    axes, _ = np.linalg.qr(rng.normal(size=(900, 3, 3)))
-    turned = turned_about_roots(points, axes, is_turned)
-    offsets = points.astype(np.float64) - points[:, :1]
-    wanted = points[:, :1] + np.einsum("sij,spj->spi", axes, offsets)
-    np.testing.assert_allclose(turned[is_turned], wanted[is_turned], atol=2e-6)
-    assert np.array_equal(turned[~is_turned], points[~is_turned]) and np.array_equal(turned[:, 0], points[:, 0])
-    assert turned_about_roots(points[:0], axes[:0], is_turned[:0]).shape == (0, 7, 3)

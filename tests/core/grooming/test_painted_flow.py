@@ -113,3 +113,31 @@ def test_the_work_of_a_long_stroke_with_a_small_radius_is_limited(monkeypatch):
     flow = painted(roots, np.tile(UP, (3, 1)), [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 0.5, 1e-7)
     assert flow.shares[0] > 0.5 and 0.5 < flow.shares[1] / flow.shares[0] < 1.0 and flow.shares[2] == 0.0
     np.testing.assert_allclose(flow.directions, [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+def test_guides_without_a_direction_keep_their_bits(plane):
+    """Guides without length, flow or share do not turn, and a guide does not depend on the others."""
+    _roots, normals, points = plane
+    flow, shares = np.tile([1.0, 0.2, 0.0], (300, 1)), np.full(300, 0.7)
+    points[:5], flow[5:10], flow[10:15], shares[15:20] = points[:5, :1], 0.0, UP, 0.0
+    after = painted_flow.turned_along(points, normals, flow, shares, FlowSettings())
+    assert np.array_equal(after[:20], points[:20]) and (after[20:] != points[20:]).any(axis=(1, 2)).all()
+    assert np.array_equal(after[:, 0], points[:, 0])
+    chosen = np.arange(0, 300, 7)
+    alone = painted_flow.turned_along(points[chosen], normals[chosen], flow[chosen], shares[chosen], FlowSettings())
+    assert np.array_equal(alone, after[chosen])
+    assert painted_flow.turned_along(points[:0], normals[:0], flow[:0], shares[:0], FlowSettings()).shape == (0, 13, 3)
+
+
+@pytest.mark.parametrize("lean", [UP, [-1.0, 0.0, 0.0]])
+def test_guides_that_stand_or_oppose_the_flow_reach_it(lean):
+    """Guides along the normal and against the flow turn by a part, then completely."""
+    points = (np.linspace(0.0, 1.0, 9)[:, None] * lean)[None].astype(np.float32)
+    settings, flow = FlowSettings(lift=0.3), np.array([[1.0, 0.0, 0.0]])
+    half, whole = (
+        painted_flow.turned_along(points, UP[None], flow, np.array([share]), settings) for share in (0.5, 1.0)
+    )
+    rise = min(np.arcsin(np.clip(np.dot(lean, UP), -1.0, 1.0)), 0.3)
+    np.testing.assert_allclose(whole[0, -1], [np.cos(rise), 0.0, np.sin(rise)], atol=1e-6)
+    assert not np.array_equal(half, points) and not np.allclose(half, whole, atol=1e-3)
+    np.testing.assert_allclose(lengths(half), 0.125, rtol=1e-5)

@@ -90,7 +90,9 @@ class FlowStroke:
             at_rest = self._at_rest(directions, chosen)
             turned = grooming.painted_flow.turned_along(points, normals, at_rest, shares, self._settings)
             near = shares > 0.0
-            if barrier is not None and near.any():
+            if barrier is not None and near.all():
+                turned = outside_guides.pushed(guides, barrier, turned, chosen)
+            elif barrier is not None and near.any():
                 turned[near] = outside_guides.pushed(guides, barrier, turned[near], chosen[near])
             shapes.append((chosen, places, turned))
         moved_count = self._shapes.write(shapes)

@@ -23,7 +23,7 @@ from .guide_tools import CombedGuides
 
 _HEAD = 0.25  # [m] extent that surfaces are scaled to
 _SKIN = 5e-5  # [m] distance of guides from a surface of this extent
-_CELL_POINTS = 65_536  # points of guides that the grid of distances is made for
+_GRID_POINTS = 3_200_000  # the grid of distances is as fine as for so many points, because it serves many events
 
 # session_uid of guide Curves → `_Barrier` of their surface in its present pose.
 barrier_cache = Cache(capacity=8)
@@ -155,7 +155,7 @@ def prepared(guides: CombedGuides, clearance: float, key: tuple) -> _Barrier:
     distance = max(_SKIN, factor * clearance)
     obstacle = dynamics.simulation.Obstacle("surface", vertices, triangles, 0.0, distance)
     origin = vertices.mean(axis=0)
-    return _Barrier(key, surface, dynamics.outside.Barrier([obstacle], origin, _CELL_POINTS, "cpu"), factor)
+    return _Barrier(key, surface, dynamics.outside.Barrier([obstacle], origin, _GRID_POINTS, "cpu"), factor)
 
 
 def pushed_posed(barrier: _Barrier, posed: np.ndarray) -> np.ndarray:
@@ -167,7 +167,10 @@ def pushed_posed(barrier: _Barrier, posed: np.ndarray) -> np.ndarray:
 
 
 def pushed(guides: CombedGuides, barrier: _Barrier, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return new points (M, P, 3) float32 [m] of chosen guides (M,) pushed outside of the posed surface."""
+    """Return new points (M, P, 3) float32 [m] of chosen guides (M,) pushed outside of the posed surface.
+
+    `points` itself if no guide moves.
+    """
     places = guides.of_count(points.shape[1], chosen)
     return _pushed_shape(guides, barrier, chosen, places, points, guides.posed_shape(chosen, points))[0]
 
@@ -179,12 +182,16 @@ def _pushed(guides, barrier, chosen, places):
 
 
 def _pushed_shape(guides, barrier, chosen, places, shape, posed):
-    """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3)."""
+    """Return the result of `_pushed` for guides with a shape (M, P, 3) at rest and posed points (M, P, 3).
+
+    The shape itself if no guide moves.
+    """
     are_frozen = frozen_points.read(guides.datablock)
     held = None if are_frozen is None else _held(are_frozen[places])
     rows, after, is_same = barrier.barrier.moved_local(posed, barrier.factor * np.eye(3), held, chosen)
-    pushed, is_moved = shape.copy(), np.zeros(len(shape), bool)
+    pushed, is_moved = shape, np.zeros(len(shape), bool)
     if len(rows):
+        pushed = shape.copy()
         # Points that stay keep their bits, the root among them.
         at_rest = guides.carried_back((after / barrier.factor).astype(np.float32), chosen[rows])
         pushed[rows] = np.where(is_same[..., None], pushed[rows], at_rest)
