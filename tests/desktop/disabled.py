@@ -42,6 +42,13 @@ def build():
     scene.collection.objects.link(scene.camera)
     scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "VELLUS", 320, 240
     scene.render.image_settings.file_format = "PNG"
+    world = scene.world or bpy.data.worlds.new("World")
+    scene.world, damaged = world, OUT / "damaged.png"
+    damaged.write_bytes(b"\x89PNG\r\n\x1a\n")
+    sky = world.node_tree.nodes.new("ShaderNodeTexEnvironment")
+    sky.image = bpy.data.images.new("Damaged", 4, 4)
+    sky.image.filepath, sky.image.source = str(damaged), "FILE"
+    world.node_tree.links.new(sky.outputs[0], world.node_tree.nodes["Background"].inputs[0])
     # A 3-D view waits for a render that has the GPU, and all of Blender with it: nobody can disable anything then.
     bpy.context.preferences.view.render_display_type = "NONE"
     viewport()[0].type = "PREFERENCES"
@@ -71,6 +78,7 @@ def disable():
     facts["disable"]["rendered"] = (OUT / "disabled.png").exists()
     yield from wait_for(lambda: not any(is_there()), 10.0)
     facts["disable"]["then there"] = is_there()
+    facts["disable"]["reports"] = [one.message for one in bpy.context.window_manager.reports]
     facts["disable"]["listed"] = MODULE in bpy.context.preferences.addons
 
 

@@ -38,6 +38,10 @@ def test_it_is_disabled_when_the_render_has_ended(walk):
     assert disable["then there"] == [False, False] and not disable["listed"]
 
 
+def test_a_render_warns_of_a_damaged_image(walk):
+    assert any("missing or damaged" in one and "damaged.png" in one for one in walk.facts["disable"]["reports"])
+
+
 def test_what_is_enabled_again_meanwhile_stays(walk):
     enable = walk.facts["enable"]
     assert enable["renders on"] and enable["there"] == enable["then there"] == [True, True] and enable["rendered"]

@@ -349,9 +349,9 @@ def _hair_receivers(hair, owners):
 def read_render(depsgraph, known, refused, noted, progress=no_progress):
     """`read` for a render, whose depsgraph may be at another time than the file: evaluated hair is read.
 
-    refused: called with the datablock and the `HairError` of hair that is left out; noted: the same for hair with some
-    strands left out; known: {session_uid: (arrays of the strands, StrandsOnGPU)} of the previous motion step,
-    updated here: unchanged hair is not uploaded again.
+    refused: called with the datablock and the `HairError` of hair that is left out, and of surfaces that cannot be
+    baked; noted: the same for hair with some strands left out; known: {session_uid: (arrays of the strands,
+    StrandsOnGPU)} of the previous motion step, updated here: unchanged hair is not uploaded again.
     """
     unlit = read_unlit(depsgraph, known, refused, noted, part_of(progress, 0.0, 0.5))
     progress("Reading lights", 0.5)
@@ -375,7 +375,7 @@ def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
         progress("Reading hair", 0.6 * len(found) / count)
     progress("Reading surfaces", 0.6)
     has_uvs = depsgraph.view_layer.use_pass_uv
-    meshes = drawn_meshes.split_clear(drawn_meshes.read_drawn_meshes(depsgraph, has_uvs=has_uvs))
+    meshes = drawn_meshes.split_clear(drawn_meshes.read_drawn_meshes(depsgraph, has_uvs=has_uvs, refused=refused))
     if depsgraph.scene.vellus.is_hair_only:
         meshes = drawn_meshes.as_holdouts(meshes)
     hair, owners, root_uvs = zip(*found, strict=True) if found else ((), (), ())

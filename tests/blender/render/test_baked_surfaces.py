@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon import api
 from hair_addon.blender.data.pictures import (
     drawn_meshes,
     kept_files,
@@ -248,6 +249,19 @@ def test_damaged_pictures_are_baked_again(stage, tmp_path, monkeypatch, damaged_
         with pytest.raises(HairError, match="damaged"):
             surface_bakes.find(shown, None, 1.0, True, True)
     assert len(made) == 2
+
+
+def test_a_render_without_a_bake_fails(stage, tmp_path, monkeypatch):
+    """A picture with plain colors instead of materials that cannot be baked is not a valid result."""
+    wall(plain_color("Skin", (0.5, 0.5, 0.5))[0])
+    add_orthographic_camera(stage)
+    errors = [HairError('Cycles cannot bake the materials of "Wall".')]
+    monkeypatch.setattr(
+        picture_jobs, "files_of", lambda _kind, _owners, waits, **_values: ({}, errors if waits else [])
+    )
+    with pytest.raises(HairError, match='cannot bake the materials of "Wall"'):
+        api.render(tmp_path / "wall.png", width=8, height=8, sample_count=1)
+    assert not (tmp_path / "wall.png").exists()
 
 
 def test_unsaved_pixels_are_of_the_local_image(stage, tmp_path):

@@ -121,16 +121,17 @@ class _Layout:
 layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
 
 
-def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True, has_uvs=False):
+def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True, has_uvs=False, refused=None):
     """Return a `DrawnMesh` for every mesh, including instances, that a 3D viewport shows as a surface; None: a
     render.
 
     is_moving: reuse the last triangulation of polygons if their corners are the same; has_normals: whether normals are
     needed, which Blender computes for each pose, or the session_uids of objects whose normals are; has_uvs: whether
-    UVs are needed without images too.
+    UVs are needed without images too; refused: called with the sentence and the `HairError` of each object whose
+    materials cannot be baked, which has plain colors then; None: prints the sentence.
     """
     meshes, override = [], depsgraph.view_layer_eval.material_override
-    bakes = _bakes(depsgraph, viewport, override)
+    bakes = _bakes(depsgraph, viewport, override, refused)
     for instance in depsgraph.object_instances:
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
             is_holdout = viewport is None and _has(instance, "holdout_get", depsgraph.view_layer)
@@ -150,7 +151,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
     return [mesh for mesh in meshes if len(mesh.triangles)]
 
 
-def _bakes(depsgraph, viewport, override):
+def _bakes(depsgraph, viewport, override, refused):
     """Return {session_uid: `Bake`} of the objects that a viewport or a render shows; a render waits for bakes."""
     if not any(unread_nodes.baked_labels(material) for material in bpy.data.materials):
         return {}  # without reading the instances once more
@@ -160,7 +161,7 @@ def _bakes(depsgraph, viewport, override):
         if one.object.type == "MESH" and one.show_self and _has_own_mesh(one) and _is_surface_seen(one, viewport)
     )
     is_render, frame = viewport is None, scene_time.time_of(depsgraph.scene)
-    return surface_bakes.find(shown, override, frame, for_render=is_render, waits=is_render)
+    return surface_bakes.find(shown, override, frame, for_render=is_render, waits=is_render, refused=refused)
 
 
 def _has_own_mesh(instance):

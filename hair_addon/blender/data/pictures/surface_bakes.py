@@ -78,14 +78,15 @@ class Bake:
         return tuple(float(one[row, column].mean(dtype=np.float64)) for one in (self.metallic, self.weight))
 
 
-def find(objects, override, frame, for_render, waits):
+def find(objects, override, frame, for_render, waits, refused=None):
     """Return {session_uid of a mesh object: `Bake`} of those of the evaluated objects whose materials need one.
 
     objects: read in turn, as Blender frees the objects of some instances when the next instance is read.
 
     override: the view layer's material; frame: the time of drivers of nodes; waits: return only when all are baked.
     Without `waits`, an object keeps its last pictures until new coarse ones are baked, and these until the fine ones
-    are baked. In Edit Mode it keeps its last pictures, and nothing is baked.
+    are baked. In Edit Mode it keeps its last pictures, and nothing is baked. refused: called with the sentence and the
+    `HairError` of each object that cannot be baked; None: prints the sentence.
     """
     paths, originals, edited = {}, {}, set()
     for one in objects:
@@ -102,7 +103,7 @@ def find(objects, override, frame, for_render, waits):
         """Return {session_uid: `Bake`}; None for a render if a file was damaged."""
         files, errors = picture_jobs.files_of("surfaces", originals, waits, frame=float(frame), for_render=for_render)
         for error in errors:
-            say(str(error))
+            say(str(error)) if refused is None else refused(str(error), error)
         used = {uid: _used(uid, files.get(path)) for uid, path in shown.items()}
         found = {uid: bake_cache.get(path, lambda path=path: _read(path)) for uid, path in used.items() if path}
         whole = {uid: bake for uid, bake in found.items() if bake is not None}
