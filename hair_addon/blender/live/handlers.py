@@ -96,6 +96,7 @@ def after_depsgraph_update(scene, depsgraph):
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
     scaled = {datablock for datablock in transformed if isinstance(datablock, bpy.types.Object)}
     kept_densities.follow(scaled, depsgraph)
+    kept_densities.follow_units(scene, depsgraph)
     stale_marks.follow_ramps()
     reported.remember_places()
     if _is_undone:

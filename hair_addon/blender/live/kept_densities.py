@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guides and hair with a density, whose number changes with the scale of their surface.
+"""Guides and hair with a density, whose number changes with the scale of their surface and with the unit of the scene.
 
 Edited and painted surfaces mark them in stale_marks.py. An animated scale does not change numbers in other frames.
 """
@@ -12,10 +12,29 @@ from ..data.strands import curves
 from ..groom import bindings
 from ..groom.surfaces import kept_densities
 from ..host import running
+from ..host.caches import Cache
 
 # Name prefix of operators that scale objects while a mouse button is held.
 _TRANSFORMS = "TRANSFORM_OT_"
 _PAUSE = 0.2  # seconds between two looks whether such an operator still runs
+
+
+unit_cache = Cache()  # session UID of a scene → length of a unit [m] with which its numbers were last compared
+
+
+def follow_units(scene, depsgraph):
+    """Mark guides and hair as stale if the scene has another Unit Scale, which Blender does not report."""
+    unit = scene.unit_settings.scale_length
+    before = unit_cache.get(scene.session_uid)
+    if unit == before:
+        return
+    unit_cache.keep(scene.session_uid, unit)
+    if before is None:
+        return
+    for one in bpy.data.hair_curves:
+        surface = curves.grown_on(one)
+        if surface is not None and scene in surface.users_scene:
+            _follow(one, depsgraph)
 
 
 def follow(transformed, depsgraph):
