@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair → meshes for games: strands as arrays beside their surface, and tubes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,6 +53,12 @@ class HairBeside:
         if self.looks is None or (self.looks.roughness == 1.0).all():
             return None
         return np.clip(appearance.shaded(self.look).roughness * self.looks.roughness, 0.0, 1.0).astype(np.float32)
+
+    def mean_look(self) -> Appearance:
+        """Return the look with the mean roughness of the strands."""
+        if self.looks is None:
+            return self.look
+        return replace(self.look, roughness=float(np.clip(self.look.roughness * self.looks.roughness.mean(), 0.0, 1.0)))
 
     def local(self, made: PolygonMesh) -> PolygonMesh:
         """Transform a mesh to the surface's local coordinates."""
@@ -120,15 +126,15 @@ def making_tubes(hair, settings):
     name = f"{read.name} Tubes"
     pieces = Pieces(read, name, joints)
     tube_count = settings.count_of(len(read.points))
-    mesh_object = pieces.new_object(
-        name, made, card_material.new_material(name, read.look), tube_count, settings.side_count
-    )
+    material = card_material.new_material(name, read.mean_look(), has_colors=made.colors is not None)
+    mesh_object = pieces.new_object(name, made, material, tube_count, settings.side_count)
     return MadeTubes(mesh_object, tube_count, made.triangle_count, read.notes)
 
 
 def _tubes(read, settings, progress):
     progress("Making tubes", 0.2)
-    return tubes.tubes(read.points, read.radii, settings), read.joints(settings)
+    colors = None if read.looks is None else read.colors()
+    return tubes.tubes(read.points, read.radii, settings, colors), read.joints(settings)
 
 
 class Pieces:

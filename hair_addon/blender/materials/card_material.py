@@ -18,7 +18,7 @@ import bpy
 
 from ...core.cards import texture_layouts
 from ...core.shading import appearance
-from ..data.made.made_meshes import UV_MAP
+from ..data.made.made_meshes import COLOR, UV_MAP
 
 _ANISOTROPY = 0.8  # highlights run across strands
 # Fraction of the scattered light that continues forward. With backlight from a sun, cards in Cycles had 0.1 to 0.17 of
@@ -32,14 +32,21 @@ _SPECULAR = 0.5  # half of a surface's: a texel contains strands of many directi
 _LAYERED, _BEHIND, _UNSTRETCHED = 1.7, 0.4, 1.2
 
 
-def new_material(name, look, images=None):
-    """Return a new material of hair with a look; images: {map: image} of cards, None for a plain color."""
+def new_material(name, look, images=None, has_colors=False):
+    """Return a new material of hair with a look; images: {map: image} of cards, None for a plain color.
+
+    has_colors: whether the color attribute of the mesh replaces the plain color.
+    """
     material = bpy.data.materials.new(name)
     color = (*appearance.mean_color(look), 1.0)
     material.diffuse_color = color
     tree = material.node_tree
     tree.nodes.clear()
     plain = _new_shader(tree, look, color, "ALL", 0.0)
+    if has_colors:
+        colors = tree.nodes.new("ShaderNodeVertexColor")
+        colors.layer_name, colors.location = COLOR, (-260.0, 0.0)
+        tree.links.new(colors.outputs["Color"], plain.inputs["Base Color"])
     if images is not None:
         nodes = _new_images(tree, images)
         shaders = [plain]

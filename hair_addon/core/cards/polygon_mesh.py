@@ -10,11 +10,15 @@ from ..geometry.mesh import Faces
 
 @dataclass(frozen=True)
 class PolygonMesh:
-    """vertices (V, 3) float32; faces: corners counter-clockwise seen from outside; uvs (corners, 2) float32."""
+    """vertices (V, 3) float32; faces: corners counter-clockwise seen from outside; uvs (corners, 2) float32.
+
+    colors: linear RGB (V, 3) float32 of vertices, None for the color of the material.
+    """
 
     vertices: np.ndarray
     faces: Faces
     uvs: np.ndarray
+    colors: np.ndarray | None = None
 
     def transformed(self, axes: np.ndarray) -> "PolygonMesh":
         """Return the mesh transformed by axes (3, 3); faces are flipped if the axes mirror."""
@@ -26,7 +30,7 @@ class PolygonMesh:
         ends = np.repeat(starts[:-1] + starts[1:] - 1, np.diff(starts))
         order = ends - np.arange(len(self.faces.corner_vertices))
         faces = Faces(np.ascontiguousarray(self.faces.corner_vertices[order]), starts)
-        return PolygonMesh(vertices, faces, np.ascontiguousarray(self.uvs[order]))
+        return PolygonMesh(vertices, faces, np.ascontiguousarray(self.uvs[order]), self.colors)
 
     @property
     def triangle_count(self) -> int:

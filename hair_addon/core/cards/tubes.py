@@ -17,9 +17,12 @@ def chosen_strands(strand_count: int, tube_count: int) -> np.ndarray:
     return np.arange(tube_count) * strand_count // max(tube_count, 1)
 
 
-def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> PolygonMesh:
+def tubes(
+    points: np.ndarray, radii: np.ndarray, settings: TubeSettings, colors: np.ndarray | None = None
+) -> PolygonMesh:
     """Return tubes around the chosen strands: points (S, P, 3), resampled by curvature; radii (S, P) in the same unit.
 
+    colors: linear RGB (S, P, 3), which the vertices get; None for the color of the material.
     Both ends are closed. U runs around the tube, V from root 0 to tip 1; end caps have the coordinates of their rings.
     Raises `HairError`.
     """
@@ -31,8 +34,10 @@ def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> Poly
     normals = curve_frames.steady_normals(curves)
     binormals = np.cross(curve_frames.tangents(curves), normals)
     along = _parts(curves)
-    at_points = np.linspace(0.0, 1.0, radii.shape[1])
-    widths = np.stack([np.interp(part, at_points, row) for part, row in zip(along, radii[chosen], strict=True)])
+    widths = _resampled(along, radii[chosen])
+    if colors is not None:
+        rings = np.stack([_resampled(along, colors[chosen][..., channel]) for channel in range(3)], axis=-1)
+        colors = np.repeat(rings.reshape(-1, 3), settings.side_count, axis=0).astype(np.float32)
     widths *= settings.thickness * np.maximum(1.0 - settings.taper * along, _LEAST_RADIUS)
     turns = np.arange(settings.side_count) * (2.0 * np.pi / settings.side_count)
     across = np.cos(turns)[:, None] * normals[:, :, None] + np.sin(turns)[:, None] * binormals[:, :, None]
@@ -40,7 +45,13 @@ def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> Poly
     faces, uvs = _topology(len(chosen), settings.point_count, settings.side_count)
     rows = np.clip(uvs[:, 1].astype(int), 0, None)  # V is an index of points up to here
     uvs[:, 1] = along.ravel()[rows]
-    return PolygonMesh(vertices.reshape(-1, 3).astype(np.float32), faces, uvs.astype(np.float32))
+    return PolygonMesh(vertices.reshape(-1, 3).astype(np.float32), faces, uvs.astype(np.float32), colors)
+
+
+def _resampled(along, values):
+    """Return values (C, P) of evenly spaced positions at the positions `along` (C, N)."""
+    positions = np.linspace(0.0, 1.0, values.shape[1])
+    return np.stack([np.interp(part, positions, row) for part, row in zip(along, values, strict=True)])
 
 
 def _parts(curves):

@@ -8,6 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.io import mesh_export
 from hair_addon.blender.settings import map_items
+from hair_addon.core.cards import tubes
 from hair_addon.core.maps.map_settings import MapSettings
 from tests.support.dynamics.following import update
 
@@ -100,3 +101,32 @@ def _pixels(image):
     values = np.empty((height, width, 4), np.float32)
     image.pixels.foreach_get(values.ravel())
     return values
+
+
+def test_tubes_have_the_colors_of_their_strands(hair, tmp_path, rng):
+    """Colors by a map are colors of vertices, also in a file; without maps there are none."""
+    curves, settings = hair.data, {"tube_count": 12, "side_count": 3, "point_count": 4}
+    assert not len(api.make_hair_tubes(hair, **settings).data.color_attributes)
+    colors = rng.uniform(0.05, 0.6, (len(curves.curves), 3)).astype(np.float32)
+    curves.attributes.new("own", "FLOAT_VECTOR", "CURVE").data.foreach_set("vector", colors.ravel())
+    look = curves.vellus.appearance
+    look.parametrization, look.random_color, look.tip_absorption = "COLOR", 0.0, 1.0
+    map_items.keep(curves.vellus, MapSettings(setting="look.color", kind="CURVES", source="own"))
+    curves.update_tag()
+    update()
+    wanted = colors[tubes.chosen_strands(len(colors), 12)]
+    made = api.make_hair_tubes(hair, **settings)
+    np.testing.assert_allclose(_colors(made), np.repeat(wanted, 12, axis=0), atol=1e-3)
+    mesh_export.write(tmp_path / "tubes.glb", [made])
+    before = set(bpy.data.objects)
+    bpy.ops.import_scene.gltf(filepath=str(tmp_path / "tubes.glb"))
+    (found,) = (one for one in set(bpy.data.objects) - before if one.type == "MESH")
+    distances = np.abs(_colors(found)[:, None] - wanted).max(axis=2)
+    assert distances.min(axis=1).max() < 0.005 and distances.min(axis=0).max() < 0.005
+
+
+def _colors(mesh_object):
+    (attribute,) = mesh_object.data.color_attributes
+    values = np.empty((len(attribute.data), 4), np.float32)
+    attribute.data.foreach_get("color", values.ravel())
+    return values[:, :3]

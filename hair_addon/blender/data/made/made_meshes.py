@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import surface_collections
 
-UV_MAP = "UVMap"
+UV_MAP, COLOR = "UVMap", "Color"
 
 
 def new_collection(name, surface_object):
@@ -28,6 +28,10 @@ def new_object(name, source, surface_object, collection, material):
     mesh.polygons.foreach_set("loop_start", faces.starts[:-1])
     uv_map = mesh.uv_layers.new(name=UV_MAP)
     uv_map.uv.foreach_set("vector", np.ascontiguousarray(source.uvs, np.float32).ravel())
+    if source.colors is not None:
+        attribute = mesh.color_attributes.new(COLOR, "FLOAT_COLOR", "POINT")
+        opaque = np.ones((len(source.colors), 1), np.float32)
+        attribute.data.foreach_set("color", np.concatenate([source.colors, opaque], axis=1).ravel())
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
     mesh.materials.append(material)
