@@ -196,6 +196,11 @@ def test_each_tile_and_each_number_is_asked_for(sky, tmp_path):
     user = sky.image_user
     user.frame_start, user.frame_duration, user.frame_offset, user.use_auto_refresh = 5, 4, 10, True
     assert [named([frame]) != [] for frame in range(5, 9)] == [False, False, True, False]
+    damaged = tmp_path / "sky" / "plate2_012.exr"
+    whole = damaged.read_bytes()
+    damaged.write_bytes(whole[: len(whole) // 2])
+    assert named([6]) == [sky.image.filepath] and named([5, 6]) == []  # frame 6 is checked again before it
+    damaged.write_bytes(whole)
     scene, tested = bpy.context.scene, range(-3, 14)
     for is_cyclic in (False, True):
         user.use_cyclic = is_cyclic

@@ -15,6 +15,11 @@ _BYTES = {3: 2, 4: 4}
 _HEAD_OF_IES = 13  # numbers before the angles
 
 
+def has_structure(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a format that `is_whole` checks."""
+    return head.startswith((_PNG, _JPEG, *_TIFF))
+
+
 def is_whole(data: bytes) -> bool | None:
     """Whether the data of an image file are complete; None if only decoding shows it.
 

@@ -181,7 +181,9 @@ def _image_files(image, users, numbers):
         timed = [user for user in users if hasattr(user, "frame_duration")]
         needed = sorted({_image_number(user, number) for user in timed for number in numbers})
         paths = tuple(_numbered(path, number) for number in needed) or (path,)
-        yield RenderedFile(image.filepath, paths, kind=IMAGE, siblings=_row_of(path))
+        # Of many frames, files are only counted: each is read before its frame.
+        kind = IMAGE if len(numbers) == 1 else ""
+        yield RenderedFile(image.filepath, paths, kind, siblings=_row_of(path))
     else:
         yield RenderedFile(image.filepath, (path,), kind=IMAGE if image.source == "FILE" else "")
 
@@ -263,7 +265,9 @@ def _kept(path, is_readable):
 
 
 def _can_be_decoded(path):
-    is_whole = whole_images.is_whole(path.read_bytes())
+    with path.open("rb") as file:
+        head = file.read(16)
+        is_whole = whole_images.is_whole(head + file.read()) if whole_images.has_structure(head) else None
     if is_whole is not None:
         return is_whole
     try:
