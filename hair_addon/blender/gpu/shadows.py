@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and depths of surfaces."""
 
+import weakref
 from dataclasses import replace
 
 import gpu
@@ -53,6 +54,7 @@ class ShadowMaps:
         self._sphere = None  # bounding sphere that the maps were last aimed at
         self._views = {}  # index of a light outside of the hair → (inputs of `_aim`, view, members that it wrote)
         self._surfaces = {}  # layer → inputs that its surfaces were drawn with
+        self._strands = {}  # layer → (its value in `_surfaces`, what its strands were drawn with, references to these)
         self._linked = (), []  # the surfaces of the last map, and `linked` of them
         self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands
         # Targets of drawing, which are then filtered into a map.
@@ -125,10 +127,26 @@ class ShadowMaps:
     def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady):
         hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
         placed = [(strands, _records(strands, view, to_world, steps, is_steady)) for strands, to_world in linked]
+        if not self._are_strands_new(layer, view, lights, placed):
+            return
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:
             self._draw_strips(layer, placed, light_block, hidden)
+
+    def _are_strands_new(self, layer, view, lights, placed):
+        """Whether a layer has other strands than `placed`, or another light; it has these from now on.
+
+        Most maps stay while one of many lights moves. Changed strands are another `StrandsOnGPU`.
+        """
+        light, strands = lights["light"][int(view["light_index"])], [one for one, _records in placed]
+        drawn_with = view.tobytes(), light.tobytes(), *(records.tobytes() for _one, records in placed)
+        surfaces, drawn_before, before = self._strands.get(layer, (None, None, ()))
+        if surfaces is self._surfaces[layer] and drawn_before == drawn_with:
+            if all(known() is one for known, one in zip(before, strands, strict=True)):
+                return False
+        self._strands[layer] = self._surfaces[layer], drawn_with, [weakref.ref(one) for one in strands]
+        return True
 
     def draw_wide(self, lights, surfaces, sphere, casters=None):
         """Draw the maps of surfaces around the hair and write each light's part in them into its record.

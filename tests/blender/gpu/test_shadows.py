@@ -83,6 +83,47 @@ def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps)
     np.testing.assert_allclose(layers.mean(axis=(0, 1)), triangle_layers.mean(axis=(0, 1)), rtol=0.03)
 
 
+def test_only_maps_that_change_are_drawn_again(scene, rng, monkeypatch):
+    """Maps of unchanged lights, strands and surfaces stay, and all maps are those that are drawn at once."""
+    points, radii = tuft(rng, 500)
+    floor = np.float32([(-1.0, -1.0, -0.2), (1.0, -1.0, -0.2), (0.0, 1.0, -0.2)])
+    kept, calls = shadows.ShadowMaps(64, 2, in_compute=True), []
+    real = drawing.rasterize_strands
+    monkeypatch.setattr(drawing, "rasterize_strands", lambda *given: calls.append(1) or real(*given))
+
+    def maps_drawn(azimuth, radius, hair, surfaces, steps):
+        found = []
+        for maps in (kept, shadows.ShadowMaps(64, 2, in_compute=True)):
+            lights = sun(azimuth, 0.8, radius)
+            lights["count"], lights["light"][1] = 2, sun(2.0, 0.5)["light"][0]
+            calls.clear()
+            maps.draw(lights, hair, surfaces, steps)
+            found.append((len(calls) // 2, [np.array(texture.read()) for texture in maps.samplers.values()]))
+        (count, textures), (all_count, others) = found
+        assert all_count == 2
+        for texture, other in zip(textures, others, strict=True):
+            np.testing.assert_array_equal(texture, other)
+        return count
+
+    hair = [(strand_textures.upload_strands(points, radii), np.eye(4))]
+    given = [0.3, 0.0, hair, [], drawing.Steps()]
+    assert maps_drawn(*given) == 2
+    assert maps_drawn(*given) == 0
+    moved = np.diag([1.2, 1.2, 1.2, 1.0])
+    changes = (
+        (0, 0.4, 1),  # one light turns
+        (2, [(strand_textures.with_points(hair[0][0], points + np.float32(0.01)), np.eye(4))], 2),
+        (2, [(hair[0][0], moved)], 2),
+        (3, [surface_textures.upload_surface(floor, np.int32([[0, 1, 2]]))], 2),
+        (4, drawing.Steps(strand_count=100), 2),
+        (3, [], 2),
+    )
+    for place, value, count in changes:
+        given[place] = value
+        assert maps_drawn(*given) == count
+        assert maps_drawn(*given) == 0
+
+
 @pytest.mark.parametrize("in_compute", [True, False])
 @pytest.mark.parametrize("turn", [1.2, 0.2, 0.0])
 @pytest.mark.parametrize("radius", [0.0015, 0.012], ids=["thin", "thick"])
