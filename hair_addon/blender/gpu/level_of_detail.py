@@ -81,12 +81,12 @@ def _points_that_show(strands, lengths, bend, least):
     """Return (N,) minimum numbers of evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by at
     most `bend` [samples] from their curves; lengths: (N,) of strands [samples].
 
-    Returns all points if only the GPU has the current points. An arc of a parabola over a chord c with a sagitta s is
+    Returns all points if only the GPU knows how strands bend. An arc of a parabola over a chord c with a sagitta s is
     longer than the chord by the fraction 8/3 (s / c)².
     """
     pieces, enough = strands.point_count - 1, np.full(len(lengths), strands.point_count)
     are_shown = np.ones(len(lengths), bool)
-    for step in range(2, pieces // (least - 1) + 1 if strands.has_points else 0):
+    for step in range(2, pieces // (least - 1) + 1 if strands.has_bends else 0):
         if pieces % step:
             continue
         drawn = pieces // step

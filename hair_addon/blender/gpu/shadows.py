@@ -314,9 +314,9 @@ def _linked(hair):
 def _records(strands, view, to_world, steps, is_steady):
     """Return `drawing.strand_records` of strands, thickened to compensate for the length that fewer points lose.
 
-    Strands at rest are drawn with the fewest points that show them.
+    Strands at rest, or that only follow their surface, are drawn with the fewest points that show them.
     """
-    if steps.point_count is None and not is_steady:
+    if steps.point_count is None and (not is_steady or not strands.has_points):
         steps = replace(steps, point_count=level_of_detail.points_within(strands, to_world, view, _GREATEST_BEND))
     records = drawing.strand_records(strands, view, to_world, steps)
     for index in np.flatnonzero(records["drawn_points"] < strands.point_count):

@@ -68,6 +68,7 @@ class StrandsOnGPU:
     moved: Moved | None = None  # None if all points are as uploaded
     is_made: bool = False  # whether the GPU has computed or carried the strands
     has_points: bool = True  # whether `points` are current, and not only the texture
+    has_bends: bool = True  # whether strands bend like `points`: they are current, or were only carried since
     lengthenings: dict = field(default_factory=dict)  # {number of points: length with all points / with that number}
 
     @property
@@ -143,6 +144,7 @@ def with_points(strands, points):
         moved=None,
         is_made=False,
         has_points=True,
+        has_bends=True,
         lengthenings={},
     )
 

@@ -126,7 +126,8 @@ class StrandGenerator:
             cached.wetness = wetness
             texture = None if wetness is None else strand_textures.numbers_texture(wetness, cached.on_gpu.row_strands)
             cached.on_gpu = replace(cached.on_gpu, wetness=texture, wetness_here=wetness)
-        cached.on_gpu = self.maker.make(cached.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
+        made = self.maker.make(cached.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
+        cached.on_gpu = replace(made, has_bends=False)
 
     def _can_carry(self, cached, pose, is_behind):
         """Whether a carrier for a pose exists, can be made now, or is not needed."""

@@ -129,7 +129,9 @@ def strands_on_gpu(datablock):
         require_indices("strands", chosen, len(cached.points))
         cached.on_gpu = strand_textures.move_strands(cached.on_gpu, chosen, _carried(cached, pose, chosen))
     elif not cached.on_gpu.has_points and cached.generator.carrier is None and not _is_behind(datablock):
-        cached.on_gpu = replace(cached.on_gpu, points=cached.points, has_points=True)  # computed meanwhile
+        cached.on_gpu = replace(  # computed meanwhile
+            cached.on_gpu, points=cached.points, has_points=True, has_bends=True, lengthenings={}
+        )
     return cached.on_gpu
 
 

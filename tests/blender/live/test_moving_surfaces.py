@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's evaluation of hair is paused while its surface moves, and resumes before other code may read it."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves, follow_nodes
+from hair_addon.blender.gpu import drawing, shadows
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import handlers, live_hair, moving_surfaces
 from hair_addon.blender.render import hair_cache
@@ -93,6 +96,20 @@ def test_playback_leaves_out_blenders_strands_and_draws_them_carried(playing, mo
     moving_surfaces.resume()
     assert not is_left_out(playing)
     np.testing.assert_allclose(shown, evaluated_points(playing), atol=CLOSE)
+
+
+def test_carried_strands_need_as_few_points_as_before(bent, monkeypatch):
+    """Strands that only follow their surface bend as before, so shadow maps draw few of their points."""
+    monkeypatch.setattr(scene_time, "is_shown_moving", lambda: True)
+    play(bent, 2, 3)
+    strands = hair_cache.strand_cache.get(bent.data.session_uid).on_gpu
+    view = drawing.view_record(np.eye(4), np.eye(4), 64)
+
+    def drawn_points(shown):
+        return int(shadows._records(shown, view, np.eye(4)[None], drawing.Steps(), is_steady=True)["drawn_points"][0])
+
+    assert not strands.has_points and drawn_points(strands) < strands.point_count
+    assert drawn_points(replace(strands, has_bends=False)) == strands.point_count
 
 
 def save(_hair, folder):

@@ -5,7 +5,7 @@ Strands at rest and their roots are uploaded once, or made on the GPU; a pose of
 of vertices around roots.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import gpu
@@ -61,7 +61,7 @@ class StrandCarrier:
             program.uniform_int(name, value)
         run_for_each(program, strands.strand_count, _GROUP_SIZE)
         gpu.shader.unbind()
-        return self.changes.changed(strands)
+        return replace(self.changes.changed(strands), has_bends=strands.has_bends)
 
 
 def new_carrier(

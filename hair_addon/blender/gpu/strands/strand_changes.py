@@ -46,7 +46,7 @@ class StrandChanges:
         else:
             # Former points are unknown: counted like more than one change.
             moved = Moved(self.moved, 1, self.moved_rows, before + 2)
-        return replace(strands, moved=moved, bounds=self.bounds.read(), is_made=True, has_points=False)
+        return replace(strands, moved=moved, bounds=self.bounds.read(), is_made=True, has_points=False, has_bends=False)
 
 
 def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:

@@ -93,6 +93,7 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
     before = uploaded(np.zeros_like(wanted))
     maker = new_maker(binding, point_count, AXES)
     made = maker.make(before, guides.numpy())
+    assert not made.has_points and not made.has_bends
     found = drawn_strands.places(made)
     lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2).sum(axis=1)
     error = np.linalg.norm(found - wanted, axis=2).max(axis=1)
