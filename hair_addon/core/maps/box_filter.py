@@ -17,7 +17,7 @@ from . import uv_islands
 # No gradients are needed. Without fused multiply-add all devices round alike.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_LEAST_STRANDS = 8_192  # fewer are not worth a thread
+_LEAST_STRANDS = 32_768  # fewer are not worth a thread
 _TAPS = 4  # texels along each side that a strand's share touches at the level where its side is at most 3 texels
 
 

@@ -15,8 +15,8 @@ MOST_SIDE = 2048  # texels along a side: larger images are averaged to limit mem
 
 _ROWS_AT_ONCE = 256
 # Smaller parts are not worth a thread, which takes half a millisecond to start if many threads run.
-_LEAST_ROWS = 128
-_LEAST_PARTS = 8_192
+_LEAST_ROWS = 256
+_LEAST_PARTS = 16_384
 
 _LANES = 16  # words of a digest
 _PART = 256  # words per digest
