@@ -118,9 +118,11 @@ class StrandGenerator:
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
         # If only points have moved, the radii are those of the datablock, which others may have changed.
-        if not bound.has_moved_only and not attributes.are_radii(cached.radii.ravel(), radii):
-            cached.radii = np.broadcast_to(radii, cached.radii.shape)
-            cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
+        if not bound.has_moved_only:
+            are_same = _have_radii(cached.radii, radii)
+            cached.radii = np.broadcast_to(radii, cached.radii.shape)  # a single row is compared the next time
+            if not are_same:
+                cached.on_gpu = strand_textures.with_radii(cached.on_gpu, cached.radii)
         wetness = bound.wetness
         if not are_equal(cached.wetness, wetness):
             cached.wetness = wetness
@@ -159,6 +161,13 @@ class StrandGenerator:
     def _is_carried_on(self, surface):
         own, others = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
         return all(a is b or np.array_equal(a, b) for a, b in zip(own, others, strict=True))
+
+
+def _have_radii(values, radii):
+    """Whether radii (S, P) of strands are (P,) radii that all of them have, or (S, P) of each."""
+    if radii.ndim == 1 and values.strides[0] == 0:  # one row in memory
+        return np.array_equal(values[0], radii)
+    return attributes.are_radii(values.ravel(), radii)
 
 
 def _is_deformed(pose):
