@@ -8,6 +8,9 @@ colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS[:SEED]: facto
 larger voxels in paths (0: by the number of paths), a factor of the number of voxels, and the random seed of the paths;
 "live" is the light of a viewport after one second at rest. Cycles' pictures are the means of two halves, whose
 difference is its own noise.
+
+With --references, many processes share Cycles' work: some with --references-only, each on one thread, render halves
+that no other process has begun, and one process draws all scenes meanwhile, then compares them with the halves.
 """
 
 import argparse
@@ -37,6 +40,7 @@ VARIANTS = (
 )
 PAUSE, MOST = 1.0 / 60.0, 20.0  # [s] after a redraw, in which a window leaves Python to other threads; at rest
 _followed, _prior_of = [], voxel_means.prior_of
+_waiting = {}  # seed → {variant: `by_vellus`} of drawn scenes that are not compared yet
 _started = time.perf_counter()
 
 
@@ -47,6 +51,38 @@ def say(text):
 
 def main():
     """Render, draw, and print the figures."""
+    options = _options()
+    random_scenes.prepare()
+    random_scenes.choose_device(options.cycles)
+    if options.references_only:
+        render_references(options)
+        return
+    gather.PathSums = _Followed
+    rows, pictures = {variant: [] for variant in options.variants}, {}
+    for seed in range(*options.seeds):
+        if time.perf_counter() - _started > options.limit:
+            break
+        build(seed)
+        halves = None if options.references else [by_cycles(options, half) for half in range(2)]
+        preferences.device = lambda: options.device
+        drawn = {variant: by_vellus(variant, options) for variant in options.variants}
+        pictures |= {f"{seed} {variant}": picture.astype(np.float16) for variant, (picture, *_) in drawn.items()}
+        _waiting[seed] = drawn
+        if halves is not None:
+            compare(seed, halves, rows, pictures)
+    while _waiting and time.perf_counter() < _started + options.patience:
+        for seed in list(_waiting):
+            paths = [options.references / f"{seed}_{half}.npy" for half in range(2)]
+            if all(path.is_file() for path in paths):
+                compare(seed, [np.load(path).astype(np.float32) for path in paths], rows, pictures)
+        time.sleep(PAUSE)
+    say(f"{len(_waiting)} scenes lack references")
+    report(rows)
+    if options.out is not None:
+        np.savez_compressed(options.out, **pictures)
+
+
+def _options():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, nargs=2, default=(911, 919), metavar=("FIRST", "END"))
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
@@ -56,47 +92,77 @@ def main():
     parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS[:SEED], or live")
     parser.add_argument("--limit", type=float, default=130.0, help="time [s] after which no further scene begins")
     parser.add_argument("--out", type=Path, help="write all pictures to this .npz file")
+    parser.add_argument("--references", type=Path, help="folder of Cycles' halves, which other processes fill")
+    parser.add_argument("--references-only", action="store_true", help="fill that folder, on one thread")
+    parser.add_argument("--patience", type=float, default=380.0, help="time [s] until which references are awaited")
     options = parser.parse_args()
-    random_scenes.prepare()
-    gather.PathSums = _Followed
-    random_scenes.choose_device(options.cycles)
-    rows, pictures = {variant: [] for variant in options.variants}, {}
+    if options.references is not None:
+        options.references.mkdir(parents=True, exist_ok=True)
+    return options
+
+
+def build(seed):
+    """Make a random scene; its hair is made on the processor, as for all other comparisons."""
+    preferences.device = lambda: "cpu"
+    random_scene.build(random_scene.recipe(seed))
+    bpy.context.scene.vellus.multiple_scattering = "GRID"
+
+
+def render_references(options):
+    """Render the halves of Cycles' pictures that no other process has begun."""
     for seed in range(*options.seeds):
-        if time.perf_counter() - _started > options.limit:
-            break
-        preferences.device = lambda: "cpu"  # hair is made on the processor, as for all other comparisons
-        random_scene.build(random_scene.recipe(seed))
-        bpy.context.scene.vellus.multiple_scattering = "GRID"
-        halves = [by_cycles(options, half) for half in range(2)]
-        reference = 0.5 * (halves[0] + halves[1])
-        if np.isnan(picture_pairs.block_error(reference, reference)):
-            say(f"{seed}: no block of hair")
-            continue
-        noise = picture_pairs.block_error(*halves), picture_pairs.structure(*halves)
-        say(f"{seed}: halves of Cycles: blocks {noise[0]:.2f}, structure {noise[1]:.3f}")
-        pictures[f"{seed} cycles"] = reference.astype(np.float16)
-        preferences.device = lambda: options.device
-        for variant in options.variants:
-            picture, seconds, variance, taken = by_vellus(variant, options)
-            blocks, structure = (
-                measure(reference, picture) for measure in (picture_pairs.block_error, picture_pairs.structure)
-            )
-            rows[variant].append((blocks, structure, seconds, picture_pairs.deviation(reference, picture)))
-            ratio = " ".join(f"{value:.3f}" for value in picture_pairs.ratio(reference, picture))
-            say(
-                f"{seed} {variant:9} blocks {blocks:5.2f}  structure {structure:.3f}  ratio {ratio}  {seconds:.2f} s  "
-                f"{taken:.0f} paths, relative variance {variance:.1f}"
-            )
-            pictures[f"{seed} {variant}"] = picture.astype(np.float16)
-    for variant, found in rows.items():
-        blocks, structures, seconds, deviations = np.array(found or [(np.nan,) * 4]).T
-        say(
-            f"{variant:9} {len(found)} scenes: blocks mean {blocks.mean():.2f}, worst {blocks.max():.2f}; structure "
-            f"mean {structures.mean():.3f}, worst {structures.min():.3f}; color off by {np.median(deviations):.1%} in "
-            f"the median, {deviations.max():.1%} at worst; light {np.median(seconds):.2f} s"
+        is_built = False
+        for half in range(2):
+            path = options.references / f"{seed}_{half}.npy"
+            if time.perf_counter() - _started > options.limit or path.is_file():
+                continue
+            try:
+                path.with_suffix(".begun").touch(exist_ok=False)
+            except FileExistsError:
+                continue
+            if not is_built:
+                build(seed)
+                is_built = True
+            bpy.context.scene.render.threads_mode, bpy.context.scene.render.threads = "FIXED", 1
+            pixels = by_cycles(options, half)
+            np.save(path.with_suffix(".part.npy"), pixels.astype(np.float16))
+            path.with_suffix(".part.npy").rename(path)
+
+
+def compare(seed, halves, rows, pictures):
+    """Print the figures of a scene that is drawn, and add them to the rows of variants."""
+    drawn, reference = _waiting.pop(seed), 0.5 * (halves[0] + halves[1])
+    if np.isnan(picture_pairs.block_error(reference, reference)):
+        say(f"{seed}: no block of hair")
+        return
+    noise = picture_pairs.block_error(*halves), picture_pairs.structure(*halves)
+    say(f"{seed}: halves of Cycles: blocks {noise[0]:.2f}, structure {noise[1]:.3f}")
+    pictures[f"{seed} cycles"] = reference.astype(np.float16)
+    for variant, (picture, seconds, variance, taken) in drawn.items():
+        blocks, structure = (
+            measure(reference, picture) for measure in (picture_pairs.block_error, picture_pairs.structure)
         )
-    if options.out is not None:
-        np.savez_compressed(options.out, **pictures)
+        deviation = picture_pairs.deviation(reference, picture)
+        # The mean of both halves has half of the noise of their difference.
+        known = np.sqrt(max(blocks**2 - 0.25 * noise[0] ** 2, 0.0))
+        rows[variant].append((blocks, structure, seconds, deviation, known))
+        ratio = " ".join(f"{value:.3f}" for value in picture_pairs.ratio(reference, picture))
+        say(
+            f"{seed} {variant:9} blocks {blocks:5.2f}  structure {structure:.3f}  ratio {ratio}  {seconds:.2f} s  "
+            f"{taken:.0f} paths, relative variance {variance:.1f}"
+        )
+
+
+def report(rows):
+    """Print the distribution of the figures of each variant."""
+    for variant, found in rows.items():
+        blocks, structures, seconds, deviations, known = np.array(found or [(np.nan,) * 5]).T
+        say(
+            f"{variant:9} {len(found)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, within 15 % "
+            f"{np.mean(deviations < 0.15):.0%}, median {np.median(deviations):.1%}, worst {deviations.max():.1%}; "
+            f"blocks mean {blocks.mean():.2f} ({known.mean():.2f} without Cycles' noise), worst {blocks.max():.2f}; "
+            f"structure mean {structures.mean():.3f}, worst {structures.min():.3f}; light {np.median(seconds):.2f} s"
+        )
 
 
 def by_cycles(options, half):
