@@ -111,7 +111,7 @@ vec3 strand_light(SeenStrand strand)
 // Radiance if paths through a grid have measured all light: a fraction of dual scattering, plus the light of the grid.
 vec3 strand_light_on_grid(SeenStrand strand)
 {
-  vec4 among = light_among_strands(drawn_position);
+  vec4 among = light_among_strands(drawn_position, strand_index, strand_position);
   return among.a * strand_light(strand) + drawn_lobes.w * among.rgb * strand.returned;
 }
 

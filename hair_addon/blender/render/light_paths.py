@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.imaging import lamps, texture_sides
+from ...core.imaging import lamps
 from ...core.long_work import no_progress, part_of
 from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
@@ -83,15 +83,10 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0, progress=no_pro
     noise = np.inf if grid.device.is_cpu else NOISE * np.sqrt(step_count)
     starting = -(-len(seen.segments) // SAMPLES_A_PATH)
     tracing = part_of(progress, 0.3, 1.0)
-    surroundings = surroundings_of(drawn)
-    sums, taken, prior = light_paths.gather.gather(grid, surroundings, seen, starting, seed, most, tracing, noise)
-    if not taken:
+    sums = light_paths.gather.gather(grid, surroundings_of(drawn), seen, starting, seed, most, tracing, noise)
+    if not sums.taken:
         return drawn
-
-    def texture_of(of_hair):
-        return light_grid.upload(light_paths.voxel_means.shares(of_hair, taken, grid.origin, prior))
-
-    return lit_by(drawn, grid, light_paths.gather.of_each(texture_of, sums))
+    return lit_by(drawn, grid, light_paths.gather.of_each(light_grid.upload, sums.texels()))
 
 
 def obstacle(drawn):
@@ -121,7 +116,8 @@ def lit_by(drawn, grid, textures, part=1.0, shift=0.0):
     lights = drawn.lights.copy()
     lights["grid_corner"][:3] = grid.corner + shift
     lights["grid_corner"][3] = part
-    lights["grid_scale"][:3] = 1.0 / (grid.voxel * texture_sides.avoid_powers_of_two(grid.shape))
+    sides = light_paths.light_texels.sides_of(grid.shape)
+    lights["grid_scale"] = *(1.0 / (grid.voxel * sides)), sides[2]
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
 

@@ -132,7 +132,7 @@ LIGHTS = Block(
         "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
         "count": "int",
         "grid_corner": "vec4",  # of the light grid [m], and how much of its light replaces dual scattering, from 0 to 1
-        "grid_scale": "vec4",  # reciprocals of its sides [1/m]; 0 without a grid
+        "grid_scale": "vec4",  # reciprocals of its sides [1/m], 0 without a grid; layers of voxels in its texture
     },
 )
 

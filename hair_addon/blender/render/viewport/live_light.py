@@ -318,6 +318,7 @@ class LiveLight:
         self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
         self._known = None  # (`_Content`, part) of the textures
         self._grid, self._textures, self._scene = None, (), (None, None)
+        self._texels, self._of_voxels = (), ()  # of the textures; textures without nodes of strands
         self._means = self._turned = None  # of the present textures; of the textures when the view turned
         self._acted, self._tried, self._goal, self._seed = -np.inf, 0, 0, 0
         self._faded = 0.0  # part of the weight of former paths that the last turn of the view removed
@@ -427,7 +428,7 @@ class LiveLight:
         return max(share, min(grown, int(self._most - self._tried)))
 
     def _follow(self, work, progress):
-        """In the thread: (paths of the share, shares by voxel); None if no strand is in sight."""
+        """In the thread: (paths of the share, texels of the light); None if no strand is in sight."""
         if sys.platform == "linux":
             os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
 
@@ -459,11 +460,11 @@ class LiveLight:
             if not found.taken:
                 return None
             if former is None:
-                return found.taken - taken, found.shares()
+                return found.taken - taken, found.texels()
             sums, weight, shift = former
             # Light measured under other lights takes no part in the final picture.
             left = max(1.0 - found.taken / self._goal, 0.0)
-            return found.taken - taken, found.shares(sums, left * weight, shift)
+            return found.taken - taken, found.texels(sums, left * weight, shift)
 
     def _take(self):
         """Show the paths of the share that has ended, if any."""
@@ -496,7 +497,7 @@ class LiveLight:
                 lambda now: before[id(now)] + np.float32(new_part) * (now - before[id(now)]), means
             )
         self._textures, self._grid = tuple(paths.gather.of_each(light_grid.upload, means)), self._paths.grid
-        self._means = means
+        self._texels, self._of_voxels, self._means = means, (), means
 
     def _new_part(self):
         """Return the part of the shown light that comes from paths since the view turned, from 0 to 1.
@@ -526,9 +527,20 @@ class LiveLight:
         found, part = drawn, 0.0 if self.obstacle else self._part()
         if part > 0.0 and len(self._textures) == len(drawn.hair):
             shift = self._content.centre - self._known[0].centre
-            found = light_paths.lit_by(drawn, self._grid, self._textures, part, shift)
+            found = light_paths.lit_by(drawn, self._grid, self._textures_of(drawn.hair), part, shift)
         self._scene = drawn, found
         return found
+
+    def _textures_of(self, hair):
+        """Return the textures for hair. Nodes of strands do not apply to another number of strands."""
+        pairs = zip(hair, self._known[0].hair, strict=True)
+        if all(now[0].strand_count == then[0].strand_count for now, then in pairs):
+            return self._textures
+        if not self._of_voxels:
+            layers = paths.light_texels.sides_of(self._grid.shape)[2]
+            alone = paths.gather.of_each(lambda texels: texels[:layers], self._texels)
+            self._of_voxels = tuple(paths.gather.of_each(light_grid.upload, alone))
+        return self._of_voxels
 
 
 def _grid_of(systems, fibres, device):

@@ -4,7 +4,8 @@
 Each path measures the light that its strand scatters to the viewer, after any number of events. Two other sums are
 gathered: the light that the same strands would scatter in uniform light, and their light as drawn without paths: dual
 scattering, with sharp shadows. From these three sums `voxel_means` computes how each strand of a voxel is shaded, so
-that the mean light of the voxel is that of the paths.
+that the mean light of the voxel is that of the paths. The light that lamps cast at once on the first strand is also
+summed by places along strands, as it differs between neighboring strands: `strand_nodes`.
 """
 
 import math
@@ -16,7 +17,7 @@ import warp as wp
 
 from ...kernels.checks import require_count, require_indices
 from ...long_work import Progress, no_progress, part_of
-from . import grid_walk, start_places, view, voxel_means, voxel_sums
+from . import grid_walk, light_texels, start_places, strand_nodes, view, voxel_means, voxel_sums
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, on_axis, walk
 from .lamp_light import Event, light_at_hit, light_at_once, light_by_share
@@ -52,12 +53,15 @@ def _gather(
     out_position: wp.array[wp.vec3],
     out_light: wp.array[wp.vec3],
     out_even: wp.array[wp.vec3],
+    out_at_once: wp.array[wp.vec3],
+    out_later: wp.array[wp.vec3],
     first: int,
 ):
     path = first + wp.tid()
     hit, direction, state = start(medium, seen_in, segments[path], keys[path])
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
+    at_once = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
     while event < _MOST_EVENTS:
         if hit.kind == PASSED:
@@ -78,6 +82,7 @@ def _gather(
                     out_position[path] = on_axis(medium, hit.index, hit.position)
                     out_even[path] = even_return(here.fibre, here.facing)
                     light_there, lamp_state = light_at_once(medium, sources, here, lamp_state)
+                    at_once = light_there
                 else:
                     light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
                 direction, weight, after = turn(here.fibre, here.facing, weight, here.offset, state)
@@ -102,6 +107,8 @@ def _gather(
                 light_there, lamp_state = light_at_hit(medium, sources, here, direction, hit, lamp_state)
                 light += wp.cw_mul(weight, light_there)
     out_light[path] = light
+    out_at_once[path] = at_once
+    out_later[path] = light - at_once
 
 
 @wp.kernel
@@ -127,10 +134,8 @@ def gather(
     most_paths: int = 0,
     progress: Progress = no_progress,
     noise: float = math.inf,
-) -> tuple[list[wp.array4d[wp.float64]], int, float]:
-    """Return ((Z, Y, X, 12) sums for each hair system on the device of the grid, number of paths, weight of larger
-    voxels for `voxel_means.shares`). The sums of a voxel are RGB: over paths, their light and the light in uniform
-    light; over the picture's samples, the light drawn without paths and the light in uniform light.
+) -> "PathSums":
+    """Return the sums of paths in a view.
 
     About `path_count` paths start on visible hair. Further passes add the number of paths that reduces the relative
     standard error of the mean light to 1.5 %, and that of visible voxels to `noise`, by estimate, at most as many as
@@ -139,7 +144,7 @@ def gather(
     light = PathSums(grid, surroundings)
     light.see(seen)
     if not len(seen.segments):
-        return light.of_systems(), 0, light.prior
+        return light
     tried, turn, more = 0, 0, path_count
     while True:
         light.follow(more, seed * _MOST_TURNS + turn, part_of(progress, tried / (tried + more), 1.0))
@@ -147,11 +152,14 @@ def gather(
         wanted = light.wanted_for(noise)  # factor of the number of paths
         more = int(tried * min(max(_SPARE * wanted - 1.0, _LEAST_TURN), 1.0))
         if wanted < 1.0 or tried + more > most_paths:
-            return light.of_systems(), int(light.taken), light.prior
+            return light
 
 
 class PathSums:
     """Sums of `gather` over the paths of any number of views, pass by pass.
+
+    The sums of a voxel are RGB: over paths, their light and the light in uniform light; over the picture's samples, the
+    light drawn without paths and the light in uniform light.
 
     taken: number of paths, reduced where sums have faded.
     """
@@ -159,6 +167,8 @@ class PathSums:
     def __init__(self, grid: StrandGrid, surroundings: Surroundings) -> None:
         self.grid, self.taken = grid, 0.0
         self._sums = voxel_sums.VoxelSums(grid)
+        self._parts = voxel_sums.VoxelSums(grid)  # light at once, later light, each with light in uniform light
+        self._nodes = strand_nodes.NodeSums(grid)
         self._total = self._squares = 0.0
         self._seen: Seen | None = None
         self._voxel_count = 0  # with visible hair
@@ -204,8 +214,11 @@ class PathSums:
         with wp.ScopedDevice(self.grid.device):
             starts = start_places.of_seen(self._in_sight, self._seen, self._voxels, count, seed)
             traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
-            positions, light, even = traced
+            positions, light, even, at_once, later = traced
             self._sums.add(positions, starts.segments, light, even, 0)
+            self._parts.add(positions, starts.segments, at_once, even, 0)
+            self._parts.add(positions, starts.segments, later, even, 6)
+            self._nodes.add(starts.segments, positions, at_once, even)
             total, squares = voxel_sums.brightness(light)
         self._total, self._squares, self.taken = self._total + total, self._squares + squares, self.taken + len(light)
 
@@ -234,17 +247,18 @@ class PathSums:
         return _standard_error(self._total, self._squares, self.taken) ** 2 * self.taken
 
     def _fade(self, weight):
-        self._sums.scale(weight)
+        for sums in (self._sums, self._parts, self._nodes):
+            sums.scale(weight)
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """Return sums (Z, Y, X, 12) of each hair system, as in `gather`."""
+        """Return sums (Z, Y, X, 12) of each hair system: the same object for linked hair."""
         return self._sums.of_systems()
 
-    def shares(
+    def texels(
         self, former: "PathSums | None" = None, weight: float = 0.0, shift: np.ndarray | float = 0.0
     ) -> list[np.ndarray]:
-        """Return `voxel_means.shares` of each hair system: the same object for linked hair.
+        """Return `light_texels.packed` of each hair system: the same object for linked hair.
 
         former: earlier sums on this device with the same number of systems, which are added with a weight; shift: (3,)
         motion of the hair since then [m].
@@ -256,7 +270,17 @@ class PathSums:
             sums.carry(former._sums, weight, shift)
         count, origin = max(int(taken), 1), self.grid.origin
         prior = voxel_means.prior_of(taken / max(self._voxel_count, 1))
-        return of_each(lambda of_hair: voxel_means.shares(of_hair, count, origin, prior), sums.of_systems())
+        found = of_each(lambda of_hair: voxel_means.shares(of_hair, count, origin, prior), sums.of_systems())
+        parts, paths = self._parts.of_systems(), max(int(self.taken), 1)
+
+        def of_nodes(system):
+            if not self._nodes.has(system):
+                return None
+            return self._nodes.texels(system, *voxel_means.smooth_box(parts[system], paths, origin, self.prior))
+
+        # Linked hair has no nodes.
+        nodes = {id(voxels): of_nodes(system) for system, voxels in enumerate(found)}
+        return of_each(lambda voxels: light_texels.packed(voxels, nodes[id(voxels)]), found)
 
 
 def of_each(make: Callable[[Any], Any], values: Sequence[Any]) -> list[Any]:
@@ -286,9 +310,11 @@ def _even_there(medium, seen_in, segments, places):
 
 
 def _traced(medium, sources, seen_in, starts, progress):
-    """Trace paths, and return their start places, their light, and the light in uniform light, (N,) each."""
+    """Trace paths, and return their start places, their light, the light in uniform light, the light that lamps
+    cast at once on the first strand, and later light, (N,) each.
+    """
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
-    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
+    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(5)]
     # On a GPU a share takes about as long as all paths.
     share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
     for first in range(0, count, share):  # none if no place is visible: Warp has no empty slices

@@ -254,14 +254,25 @@ def shares(
     require_count("sums", sums.shape[3], CHANNELS)
     with wp.ScopedDevice(sums.device):
         found = wp.empty(sums.shape[:3], dtype=wp.vec4)
-        # One hair system may occupy a small part of the grid.
-        box = _box_of(sums)
-        low = tuple(part.start for part in box)
-        inner = sums[box]
-        first = tuple(one + before for one, before in zip(origin, low[::-1], strict=True))
-        ratios = _smooth(inner, path_count, first, prior)
+        ratios, low = smooth_box(sums, path_count, origin, prior)
+        high = [start + side for start, side in zip(low, ratios.shape, strict=False)]
+        inner = sums[tuple(slice(start, end) for start, end in zip(low, high, strict=True))]
         _by_voxels(_keep, found, [ratios, _explained(inner), wp.vec3i(*low), found])
         return found.numpy()
+
+
+def smooth_box(
+    sums: wp.array4d[wp.float64],
+    path_count: int,
+    origin: tuple[int, int, int] = (0, 0, 0),
+    prior: float = MOST_PRIOR,
+) -> tuple[wp.array4d[wp.float64], tuple[int, int, int]]:
+    """Return (`smooth_ratios` of the voxels around all data, on the device; first of these voxels along Z, Y, X)."""
+    with wp.ScopedDevice(sums.device):
+        box = _box_of(sums)
+        low = tuple(part.start for part in box)
+        first = tuple(one + before for one, before in zip(origin, low[::-1], strict=True))
+        return _smooth(sums[box], path_count, first, prior), low
 
 
 def explained_part(sums: wp.array4d[wp.float64]) -> float:
@@ -337,7 +348,7 @@ def _by_voxels(kernel, voxels, inputs):
 def _box_of(sums):
     """Return slices along Z, Y, X around all voxels of (Z, Y, X, 12) sums with data.
 
-    The whole range if there is none.
+    The whole range if there is none. One hair system may occupy a small part of the grid.
     """
     used = [wp.zeros(side, dtype=wp.uint8) for side in sums.shape[:3]]
     _by_voxels(_mark, sums, [sums, *used])

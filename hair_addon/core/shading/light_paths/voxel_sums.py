@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths and samples by voxel and hair system, on the device of a grid. Linked hair has common sums.
-
-The same paths give the same bits in any order: on a GPU integers are added, scaled so that the sum of all values fits
-62 bits even if all equal the largest.
-"""
+"""Sums over paths and samples by voxel and hair system, on the device of a grid. Linked hair has common sums."""
 
 import numpy as np
 import warp as wp
 
 from ...kernels import kernel_cache
 from ...kernels.checks import require_count
+from . import row_sums
 from .start_places import voxel_at
 from .strand_grid import StrandGrid
 from .voxel_means import CHANNELS
@@ -17,91 +14,24 @@ from .voxel_means import CHANNELS
 wp.set_module_options({"enable_backward": False})
 
 _MOST_PARTS = 4096  # parts of all values
-_LARGEST_SUM = 4.0e18  # limit of integers, below 2^62
-
-
-@wp.struct
-class _Places:
-    """The sum that each of N values is added to: the voxel of its place, for the hair of its segment."""
-
-    places: wp.array[wp.vec3]
-    segments: wp.array[int]
-    strands: wp.array[int]
-    sums: wp.array[int]
-    corner: wp.vec3
-    voxel: float
-    shape: wp.vec3i
-
-
-@wp.func
-def _row_of(at: _Places, index: int):
-    cell = voxel_at(at.places[index], at.corner, at.voxel, at.shape)
-    row = (cell[2] * at.shape[1] + cell[1]) * at.shape[0] + cell[0]
-    return at.sums[at.strands[at.segments[index]]] * (at.shape[0] * at.shape[1] * at.shape[2]) + row
 
 
 @wp.kernel
-def _add_in_order(
-    at: _Places,
-    first_values: wp.array[wp.vec3],
-    second_values: wp.array[wp.vec3],
-    first_channel: int,
-    out_sums: wp.array2d[wp.float64],
+def _find_rows(
+    places: wp.array[wp.vec3],
+    segments: wp.array[int],
+    strands: wp.array[int],
+    sums: wp.array[int],
+    corner: wp.vec3,
+    voxel: float,
+    shape: wp.vec3i,
+    out_rows: wp.array[int],
 ):
-    """Add values one after the other, on one CPU core."""
+    """Find the voxel of each place, for the hair of its segment."""
     index = wp.tid()
-    row = _row_of(at, index)
-    for channel in range(3):
-        out_sums[row, first_channel + channel] += wp.float64(first_values[index][channel])
-        out_sums[row, first_channel + 3 + channel] += wp.float64(second_values[index][channel])
-
-
-@wp.kernel
-def _find_largest(
-    first_values: wp.array[wp.vec3], second_values: wp.array[wp.vec3], part_size: int, out_largest: wp.array[float]
-):
-    part = wp.tid()
-    largest = float(0.0)
-    for index in range(part * part_size, wp.min((part + 1) * part_size, first_values.shape[0])):
-        for channel in range(3):
-            largest = wp.max(largest, wp.abs(first_values[index][channel]))
-            largest = wp.max(largest, wp.abs(second_values[index][channel]))
-    wp.atomic_max(out_largest, 0, largest)
-
-
-@wp.func
-def _scale(largest: wp.array[float], count: int):
-    """Return the integer that represents one, for `count` values up to the largest."""
-    return wp.float64(_LARGEST_SUM) / (wp.max(wp.float64(largest[0]), wp.float64(1e-30)) * wp.float64(count))
-
-
-@wp.kernel
-def _add_whole(
-    at: _Places,
-    first_values: wp.array[wp.vec3],
-    second_values: wp.array[wp.vec3],
-    largest: wp.array[float],
-    out_whole: wp.array2d[wp.int64],
-):
-    index = wp.tid()
-    row = _row_of(at, index)
-    scale = _scale(largest, first_values.shape[0])
-    for channel in range(3):
-        wp.atomic_add(out_whole, row, channel, wp.int64(scale * wp.float64(first_values[index][channel])))
-        wp.atomic_add(out_whole, row, 3 + channel, wp.int64(scale * wp.float64(second_values[index][channel])))
-
-
-@wp.kernel
-def _add_sums(
-    whole: wp.array2d[wp.int64],
-    largest: wp.array[float],
-    count: int,
-    first_channel: int,
-    out_sums: wp.array2d[wp.float64],
-):
-    row, channel = wp.tid()
-    if whole[row, channel] != wp.int64(0):
-        out_sums[row, first_channel + channel] += wp.float64(whole[row, channel]) / _scale(largest, count)
+    cell = voxel_at(places[index], corner, voxel, shape)
+    row = (cell[2] * shape[1] + cell[1]) * shape[0] + cell[0]
+    out_rows[index] = sums[strands[segments[index]]] * (shape[0] * shape[1] * shape[2]) + row
 
 
 @wp.kernel
@@ -132,12 +62,6 @@ def _carry(
         out_sums[row, channel] += weight * known
 
 
-@wp.kernel
-def _scale_sums(weight: wp.float64, out_sums: wp.array2d[wp.float64]):
-    row, channel = wp.tid()
-    out_sums[row, channel] *= weight
-
-
 class VoxelSums:
     """(different hair, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
 
@@ -149,14 +73,14 @@ class VoxelSums:
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
         """Return the sums (Z, Y, X, 12) of each hair system: the same object for linked hair."""
-        count = int(np.prod(self._voxels))
+        count, shape = int(np.prod(self._voxels)), (*self._voxels, CHANNELS)
         firsts = range(0, len(self._sums), count)
-        found = [self._sums[first : first + count].reshape((*self._voxels, CHANNELS)) for first in firsts]
+        found = [self._sums[first : first + count].reshape(shape) for first in firsts]
         return [found[index] for index in self.grid.sums_of_systems]
 
     def scale(self, weight: float) -> None:
         """Multiply all sums by a weight."""
-        kernel_cache.launch(_scale_sums, self._sums.shape, [wp.float64(weight)], [self._sums], self._sums.device)
+        row_sums.scale(self._sums, weight)
 
     def carry(self, before: "VoxelSums", weight: float, shift: np.ndarray | float) -> None:
         """Add the sums of another grid on this device with as many different hair systems, multiplied by a weight.
@@ -188,29 +112,11 @@ class VoxelSums:
             require_count("values by voxel", len(values), count)
         if not count:
             return
-        given = [self._places(places, segments), first_values, second_values]
-        add = _in_order if self.grid.device.is_cpu else _in_any_order
-        add(self._sums, given, first_channel)
-
-    def _places(self, places, segments):
-        grid, at = self.grid, _Places()
-        at.places, at.segments, at.strands, at.sums = places, segments, grid.strands, grid.sums
-        at.corner, at.voxel, at.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
-        return at
-
-
-def _in_order(sums, given, first_channel):
-    kernel_cache.launch(_add_in_order, len(given[1]), [*given, first_channel], [sums], sums.device)
-
-
-def _in_any_order(sums, given, first_channel):
-    count, device = len(given[1]), sums.device
-    largest = wp.zeros(1, dtype=float, device=device)
-    whole = wp.zeros((len(sums), 6), dtype=wp.int64, device=device)
-    size = -(-count // _MOST_PARTS)
-    kernel_cache.launch(_find_largest, -(-count // size), [*given[1:], size], [largest], device)
-    kernel_cache.launch(_add_whole, count, [*given, largest], [whole], device)
-    kernel_cache.launch(_add_sums, whole.shape, [whole, largest, count, first_channel], [sums], device)
+        rows, grid = wp.empty(count, dtype=int, device=self._sums.device), self.grid
+        given = [places, segments, grid.strands, grid.sums]
+        given += [wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)]
+        kernel_cache.launch(_find_rows, count, given, [rows], rows.device)
+        row_sums.add(self._sums, rows, first_values, second_values, first_channel)
 
 
 @wp.kernel

@@ -74,8 +74,8 @@ def sun(axis, power=3.0):
 
 def gathered(*args, **details):
     """Return (systems, Z, Y, X, 12) sums and the number of paths."""
-    sums, taken, _prior = gather.gather(*args, **details)
-    return np.stack([of_hair.numpy() for of_hair in sums]), taken
+    sums = gather.gather(*args, **details)
+    return np.stack([of_hair.numpy() for of_hair in sums.of_systems()]), int(sums.taken)
 
 
 def by_voxel(sums):
@@ -155,7 +155,7 @@ def test_what_ends_at_a_pause_leaves_sums_as_they_are(rng):
                 with pytest.raises(InterruptedError), parallel.on_one_core(pause):
                     work()
         sums.follow(500, 2)
-        found.append((sums.taken, sums.shares()))
+        found.append((sums.taken, sums.texels()))
     assert found[0][0] == found[1][0] > 0
     np.testing.assert_array_equal(found[0][1], found[1][1])
 

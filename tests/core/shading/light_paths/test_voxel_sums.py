@@ -7,7 +7,7 @@ import warp as wp
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.shading.fibre import strand_variation
-from hair_addon.core.shading.light_paths import media, start_places, strand_grid, voxel_means, voxel_sums
+from hair_addon.core.shading.light_paths import media, row_sums, start_places, strand_grid, voxel_means, voxel_sums
 from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import WHITE, grid_of, strands_in_a_box
 
@@ -52,7 +52,7 @@ def added(grid, segments, places, first, second, channel):
 
 @pytest.mark.parametrize("way", ["_in_order", "_in_any_order"])
 def test_values_are_added_to_their_hair_and_voxel(rng, monkeypatch, way):
-    monkeypatch.setattr(voxel_sums, "_in_order", getattr(voxel_sums, way))
+    monkeypatch.setattr(row_sums, "_in_order", getattr(row_sums, way))
     grid = two_systems(rng)
     segments, places, first, second = samples_of(rng, grid, 5000)
     sums = added(grid, segments, places, first, second, 6)

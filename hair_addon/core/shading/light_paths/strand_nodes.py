@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums over paths by nodes, which are places along strands, for light that differs between the strands of a voxel.
+
+Nodes contain the light that lamps cast on a strand at once: shadows and highlights of single strands. At a place this
+light has little noise. Later light has more noise and varies less from strand to strand, so it comes from voxels.
+"""
+
+import numpy as np
+import warp as wp
+
+from ...kernels import kernel_cache
+from ...kernels.checks import require_count
+from . import row_sums, voxel_sums
+from .strand_grid import StrandGrid
+
+wp.set_module_options({"enable_backward": False})
+
+NODES = 4  # of each strand: STRAND_NODES of shaders/light/light_grid.glsl
+_PRIOR = 6.0  # weight of the light of voxels, in paths
+_MOST_NODES = 1_048_576  # of all hair
+
+rgb = wp.types.vector(length=3, dtype=wp.float64)
+
+
+@wp.struct
+class _Strands:
+    """A system of strands in a grid: their points from `first_point` on, and their nodes from `first_node` on."""
+
+    first_point: int
+    point_count: int
+    strand_count: int
+    first_node: int
+
+
+@wp.kernel
+def _find_nodes(
+    of: _Strands,
+    points: wp.array[wp.vec3],
+    segments: wp.array[int],
+    places: wp.array[wp.vec3],
+    out_rows: wp.array[int],
+):
+    """Find the nodes nearest to places on the axes of segments of a system."""
+    index = wp.tid()
+    segment = segments[index]
+    local = segment - of.first_point
+    if local >= 0 and local < of.strand_count * of.point_count:
+        start = points[segment]
+        along = points[segment + 1] - start
+        part = wp.dot(places[index] - start, along) / wp.max(wp.dot(along, along), 1e-30)
+        position = float(local % of.point_count) + wp.clamp(part, 0.0, 1.0)
+        node = int(position / float(of.point_count - 1) * float(NODES))
+        out_rows[index] = of.first_node + local / of.point_count * NODES + wp.clamp(node, 0, NODES - 1)
+
+
+@wp.func
+def _ratios_at(ratios: wp.array4d[wp.float64], low: wp.vec3i, place: wp.vec3):
+    """Return both RGB ratios at a place [voxels] in the grid, linear between voxels; low: first voxel with ratios along
+    Z, Y, X.
+    """
+    first = rgb()
+    second = rgb()
+    weight = wp.vec3(0.0, 0.0, 0.0)
+    cell = wp.vec3i(0, 0, 0)
+    for axis in range(3):
+        at = place[axis] - 0.5 - float(low[2 - axis])
+        at = wp.clamp(at, 0.0, float(ratios.shape[2 - axis] - 1))
+        cell[axis] = int(at)
+        weight[axis] = at - wp.floor(at)
+    for corner in range(8):
+        x = wp.min(cell[0] + corner % 2, ratios.shape[2] - 1)
+        y = wp.min(cell[1] + corner / 2 % 2, ratios.shape[1] - 1)
+        z = wp.min(cell[2] + corner / 4, ratios.shape[0] - 1)
+        part = wp.where(corner % 2 == 1, weight[0], 1.0 - weight[0])
+        part *= wp.where(corner / 2 % 2 == 1, weight[1], 1.0 - weight[1])
+        part *= wp.where(corner / 4 == 1, weight[2], 1.0 - weight[2])
+        for channel in range(3):
+            first[channel] += wp.float64(part) * ratios[z, y, x, channel]
+            second[channel] += wp.float64(part) * ratios[z, y, x, 3 + channel]
+    return first, second
+
+
+@wp.kernel
+def _find_texels(
+    of: _Strands,
+    points: wp.array[wp.vec3],
+    corner: wp.vec3,
+    voxel: float,
+    ratios: wp.array4d[wp.float64],
+    low: wp.vec3i,
+    sums: wp.array2d[wp.float64],
+    prior: wp.float64,
+    out_texels: wp.array[wp.vec4],
+):
+    node = wp.tid()
+    row = of.first_node + node
+    even = sums[row, 3] + sums[row, 4] + sums[row, 5]
+    known = even / (even + prior)
+    position = (float(node % NODES) + 0.5) / float(NODES) * float(of.point_count - 1)
+    below = wp.clamp(int(position), 0, of.point_count - 2)
+    first = of.first_point + node / NODES * of.point_count + below
+    place = points[first] + (position - float(below)) * (points[first + 1] - points[first])
+    light = rgb()
+    rest = wp.float64(1.0)
+    at_once, later = _ratios_at(ratios, low, (place - corner) / voxel)
+    total = at_once + later
+    if even > wp.float64(0.0) and total[0] + total[1] + total[2] > wp.float64(0.0):
+        share = (at_once[0] + at_once[1] + at_once[2]) / (total[0] + total[1] + total[2])
+        rest = wp.float64(1.0) - known * share
+        for channel in range(3):
+            here = sums[row, channel] / wp.max(sums[row, 3 + channel], wp.float64(1e-12))
+            # Later light is a part of the voxel's, except for its color.
+            light[channel] = known * (here + later[channel] - (wp.float64(1.0) - share) * total[channel])
+    out_texels[node] = wp.vec4(float(light[0]), float(light[1]), float(light[2]), float(rest))
+
+
+class NodeSums:
+    """(nodes, 6) sums over paths of a `StrandGrid`, zero at first: light at once, light in uniform light.
+
+    Systems have no nodes if they are linked, as their sums are common, if the grid contains only some of their strands,
+    or if there are too many.
+    """
+
+    def __init__(self, grid: StrandGrid) -> None:
+        self.grid = grid
+        self._taken = self._even = 0.0  # number of paths, and all their light in uniform light
+        self._systems: dict[int, _Strands] = {}
+        ends = [*(system.first_point for system in grid.thinned[1:]), len(grid.points)]
+        node_count = 0
+        for index, (system, end) in enumerate(zip(grid.thinned, ends, strict=True)):
+            count = (end - system.first_point) // system.point_count
+            is_linked = grid.sums_of_systems.count(grid.sums_of_systems[index]) > 1
+            is_whole = system.stride == 1 and system.point_count > 1
+            if is_whole and not is_linked and 0 < count * NODES <= _MOST_NODES - node_count:
+                of = _Strands()
+                of.first_point, of.point_count = system.first_point, system.point_count
+                of.strand_count, of.first_node = count, node_count
+                self._systems[index] = of
+                node_count += count * NODES
+        self._sums = wp.zeros((node_count, 6), dtype=wp.float64, device=grid.device)
+
+    def has(self, system: int) -> bool:
+        """Whether a system, by its index, has nodes."""
+        return system in self._systems
+
+    def scale(self, weight: float) -> None:
+        """Multiply all sums by a weight."""
+        self._taken, self._even = weight * self._taken, weight * self._even
+        if len(self._sums):
+            row_sums.scale(self._sums, weight)
+
+    def add(
+        self, segments: wp.array[int], places: wp.array[wp.vec3], light: wp.array[wp.vec3], even: wp.array[wp.vec3]
+    ) -> None:
+        """Add the light of paths (N,) that start at places on the axes of segments, and their light in uniform light.
+
+        segments: of the grid, which the caller has checked.
+        """
+        for values in (places, light, even):
+            require_count("values by node", len(values), len(segments))
+        if not len(segments) or not len(self._sums):
+            return
+        self._taken, self._even = self._taken + len(segments), self._even + voxel_sums.brightness(even)[0]
+        rows = wp.full(len(segments), -1, dtype=int, device=self._sums.device)
+        for of in self._systems.values():
+            given = [of, self.grid.points, segments, places]
+            kernel_cache.launch(_find_nodes, len(segments), given, [rows], rows.device)
+        row_sums.add(self._sums, rows, light, even)
+
+    def texels(self, system: int, ratios: wp.array4d[wp.float64], low: tuple[int, int, int]) -> np.ndarray:
+        """Return (S, NODES, 4) float32 of a system: RGB relative to the light in uniform light, to which the light of
+        voxels is added with the weight in the fourth channel.
+
+        ratios: RGB of light at once, then of later light (Z, Y, X, 6), of the voxels from `low` on, along Z, Y, X.
+        """
+        of, grid, device = self._systems[system], self.grid, self._sums.device
+        texels = wp.empty(of.strand_count * NODES, dtype=wp.vec4, device=device)
+        prior = wp.float64(max(_PRIOR * self._even / max(self._taken, 1.0), 1e-30))
+        given = [of, grid.points, wp.vec3(*grid.corner.tolist()), grid.voxel, ratios, wp.vec3i(*low), self._sums, prior]
+        kernel_cache.launch(_find_texels, len(texels), given, [texels], device)
+        return texels.numpy().reshape(-1, NODES, 4)
