@@ -6,7 +6,7 @@
 Prints the error of means of 12 × 12 pixels in display levels of 255, the structural similarity, the ratio of mean
 colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS[:SEED]: factors of the number of paths, the weight of
 larger voxels in paths (0: by the number of paths), a factor of the number of voxels, and the random seed of the paths;
-"live" is the light of a viewport after one second at rest. Cycles' pictures are the means of two halves, whose
+"live" is the light of a viewport after one second at rest, "voxels" the same without nodes of strands. Cycles' pictures are the means of two halves, whose
 difference is its own noise.
 
 With --references, many processes share Cycles' work: some with --references-only, each on one thread, render halves
@@ -32,7 +32,7 @@ from hair_addon.blender.gpu import drawing
 from hair_addon.blender.render import drawn_scene, film, light_paths
 from hair_addon.blender.render.viewport import live_light
 from hair_addon.blender.settings import preferences
-from hair_addon.core.shading.light_paths import gather, strand_grid, voxel_means
+from hair_addon.core.shading.light_paths import gather, strand_grid, strand_nodes, voxel_means
 
 VARIANTS = (
     *("1:128:1", "1:0:1", "1:32:1", "1:8:1", "4:128:1", "4:0:1", "4:32:1", "4:8:1"),
@@ -89,7 +89,7 @@ def _options():
     parser.add_argument("--samples", type=int, default=1024, help="samples per pixel of each half of Cycles' pictures")
     parser.add_argument("--cycles", default="CPU", choices=("CPU", "CUDA", "OPTIX", "METAL"), help="Cycles' device")
     parser.add_argument("--device", default="cpu", help="the Warp device that follows paths")
-    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS[:SEED], or live")
+    parser.add_argument("--variants", nargs="+", default=VARIANTS, help="PATHS:PRIOR:VOXELS[:SEED], live, or voxels")
     parser.add_argument("--limit", type=float, default=130.0, help="time [s] after which no further scene begins")
     parser.add_argument("--out", type=Path, help="write all pictures to this .npz file")
     parser.add_argument("--references", type=Path, help="folder of Cycles' halves, which other processes fill")
@@ -180,7 +180,12 @@ def by_vellus(variant, options):
     camera = data_scene.read_camera(blender_scene, depsgraph, *size)
     drawn = drawn_scene.read(blender_scene, bpy.context.view_layer, depsgraph)
     count = light_paths.path_count(blender_scene, size)
-    lit, seconds = at_rest(drawn, camera, count) if variant == "live" else traced(drawn, camera, count, variant)
+    is_live, most = variant in ("live", "voxels"), strand_nodes._MOST_NODES
+    strand_nodes._MOST_NODES = 0 if variant == "voxels" else most
+    try:
+        lit, seconds = at_rest(drawn, camera, count) if is_live else traced(drawn, camera, count, variant)
+    finally:
+        strand_nodes._MOST_NODES = most
     light = _followed[-1] if _followed else None
     variance, taken = (0.0, 0) if light is None else (light.wanted * gather._KNOWN**2 * light.taken, light.taken)
     picture = film.Film(size, 4, ("Combined",), True, 2.0 * blender_scene.render.filter_size)
