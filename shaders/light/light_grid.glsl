@@ -6,19 +6,18 @@ bool has_light_grid()
   return lights.grid_scale.x > 0.0;
 }
 
-const int STRAND_NODES = 4;  // NODES of core/shading/light_paths/strand_nodes.py
-
 // From the nodes of a strand: RGB, light as below; alpha, the fraction of the light of voxels to add.
 vec4 light_of_nodes(int strand, float position)
 {
   ivec3 size = textureSize(light_grid, 0);
-  int in_row = size.x / STRAND_NODES;
+  int nodes = int(texelFetch(light_grid, size - 1, 0).r);
+  int in_row = size.x / nodes;
   int in_layer = in_row * size.y;
   int layer = strand / in_layer;
   int rest = strand - layer * in_layer;
   int row = rest / in_row;
-  float node = clamp(position * float(STRAND_NODES), 0.5, float(STRAND_NODES) - 0.5);
-  float x = float((rest - row * in_row) * STRAND_NODES) + node;
+  float node = clamp(position * float(nodes), 0.5, float(nodes) - 0.5);
+  float x = float((rest - row * in_row) * nodes) + node;
   vec3 texel = vec3(x, float(row) + 0.5, lights.grid_scale.w + float(layer) + 0.5);
   return textureLod(light_grid, texel / vec3(size), 0.0);
 }

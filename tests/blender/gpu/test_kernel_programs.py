@@ -190,7 +190,7 @@ def paths_of(grid, light, count):
     return given, len(starts.segments), mesh
 
 
-GATHERED = dict.fromkeys(("out_position", "out_light", "out_even", "out_at_once", "out_later"), wp.vec3)
+GATHERED = dict.fromkeys(("out_position", "out_light", "out_even", "out_at_once", "out_later", "out_world"), wp.vec3)
 
 
 def test_paths_of_light_are_those_of_the_processor(rng):

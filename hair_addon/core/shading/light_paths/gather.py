@@ -27,6 +27,7 @@ from .seen_rays import Seen
 from .start_places import start
 from .strand_grid import StrandGrid
 from .surface_walk import surface_of, surface_turn
+from .world_light import world_radiance
 
 FOLLOWING = "Following light"  # name of the step for progress
 
@@ -55,6 +56,7 @@ def _gather(
     out_even: wp.array[wp.vec3],
     out_at_once: wp.array[wp.vec3],
     out_later: wp.array[wp.vec3],
+    out_world: wp.array[wp.vec3],
     first: int,
 ):
     path = first + wp.tid()
@@ -62,6 +64,7 @@ def _gather(
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     at_once = wp.vec3(0.0, 0.0, 0.0)
+    of_world = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
     while event < _MOST_EVENTS:
         if hit.kind == PASSED:
@@ -106,9 +109,12 @@ def _gather(
                 hit = walk(medium, here.position, direction, _FAR, here.own)
                 light_there, lamp_state = light_at_hit(medium, sources, here, direction, hit, lamp_state)
                 light += wp.cw_mul(weight, light_there)
+                if hit.kind == PASSED and sources.world.is_uneven == 0:
+                    of_world += wp.cw_mul(weight, world_radiance(sources.world, direction))
     out_light[path] = light
     out_at_once[path] = at_once
-    out_later[path] = light - at_once
+    out_later[path] = light - at_once - of_world
+    out_world[path] = of_world
 
 
 @wp.kernel
@@ -167,7 +173,7 @@ class PathSums:
     def __init__(self, grid: StrandGrid, surroundings: Surroundings) -> None:
         self.grid, self.taken = grid, 0.0
         self._sums = voxel_sums.VoxelSums(grid)
-        self._parts = voxel_sums.VoxelSums(grid)  # light at once, later light, each with light in uniform light
+        self._parts = voxel_sums.VoxelSums(grid, strand_nodes.CHANNELS)
         self._nodes = strand_nodes.NodeSums(grid)
         self._total = self._squares = 0.0
         self._seen: Seen | None = None
@@ -214,11 +220,11 @@ class PathSums:
         with wp.ScopedDevice(self.grid.device):
             starts = start_places.of_seen(self._in_sight, self._seen, self._voxels, count, seed)
             traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
-            positions, light, even, at_once, later = traced
+            positions, light, even, *parts = traced
             self._sums.add(positions, starts.segments, light, even, 0)
-            self._parts.add(positions, starts.segments, at_once, even, 0)
-            self._parts.add(positions, starts.segments, later, even, 6)
-            self._nodes.add(starts.segments, positions, at_once, even)
+            for index, part in enumerate(parts):
+                self._parts.add(positions, starts.segments, part, even, 6 * index)
+            self._nodes.add(starts.segments, positions, parts[0], even)
             total, squares = voxel_sums.brightness(light)
         self._total, self._squares, self.taken = self._total + total, self._squares + squares, self.taken + len(light)
 
@@ -314,7 +320,7 @@ def _traced(medium, sources, seen_in, starts, progress):
     cast at once on the first strand, and later light, (N,) each.
     """
     count, seen_here, device = len(starts.segments), view.on_device(seen_in), medium.points.device
-    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(5)]
+    found = [wp.zeros(count, dtype=wp.vec3) for _ in range(6)]
     # On a GPU a share takes about as long as all paths.
     share = max(count // _SHARES, _LEAST_SHARE) if device.is_cpu else max(count, 1)
     for first in range(0, count, share):  # none if no place is visible: Warp has no empty slices

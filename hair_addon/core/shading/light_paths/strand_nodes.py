@@ -2,7 +2,8 @@
 """Sums over paths by nodes, which are places along strands, for light that differs between the strands of a voxel.
 
 Nodes contain the light that lamps cast on a strand at once: shadows and highlights of single strands. At a place this
-light has little noise. Later light has more noise and varies less from strand to strand, so it comes from voxels.
+light has little noise. Later light has more noise and varies less from strand to strand, so it comes from voxels. So
+does the light of an even world, which no ray to a lamp finds at once.
 """
 
 import numpy as np
@@ -10,14 +11,17 @@ import warp as wp
 
 from ...kernels import kernel_cache
 from ...kernels.checks import require_count
-from . import row_sums, voxel_sums
+from . import light_texels, row_sums, voxel_sums
 from .strand_grid import StrandGrid
 
 wp.set_module_options({"enable_backward": False})
 
-NODES = 4  # of each strand: STRAND_NODES of shaders/light/light_grid.glsl
+CHANNELS = 18  # RGB of light at once, later light, light of an even world; each with light in uniform light
 _PRIOR = 6.0  # weight of the light of voxels, in paths
-_MOST_NODES = 1_048_576  # of all hair
+_MOST_NODES = 262_144  # of all hair
+_LEAST_OF_STRAND, _MOST_OF_STRAND = 4, 64
+_LONGEST = 2.0  # length of strands between nodes [voxels]: light of voxels also varies along a strand
+_SAMPLED = 1000  # strands that are measured
 
 rgb = wp.types.vector(length=3, dtype=wp.float64)
 
@@ -30,6 +34,7 @@ class _Strands:
     point_count: int
     strand_count: int
     first_node: int
+    node_count: int  # of each strand
 
 
 @wp.kernel
@@ -49,17 +54,19 @@ def _find_nodes(
         along = points[segment + 1] - start
         part = wp.dot(places[index] - start, along) / wp.max(wp.dot(along, along), 1e-30)
         position = float(local % of.point_count) + wp.clamp(part, 0.0, 1.0)
-        node = int(position / float(of.point_count - 1) * float(NODES))
-        out_rows[index] = of.first_node + local / of.point_count * NODES + wp.clamp(node, 0, NODES - 1)
+        node = int(position / float(of.point_count - 1) * float(of.node_count))
+        node = wp.clamp(node, 0, of.node_count - 1)
+        out_rows[index] = of.first_node + local / of.point_count * of.node_count + node
 
 
 @wp.func
 def _ratios_at(ratios: wp.array4d[wp.float64], low: wp.vec3i, place: wp.vec3):
-    """Return both RGB ratios at a place [voxels] in the grid, linear between voxels; low: first voxel with ratios along
-    Z, Y, X.
+    """Return the three RGB ratios at a place [voxels] in the grid, linear between voxels; low: first voxel with ratios
+    along Z, Y, X.
     """
-    first = rgb()
-    second = rgb()
+    at_once = rgb()
+    later = rgb()
+    of_world = rgb()
     weight = wp.vec3(0.0, 0.0, 0.0)
     cell = wp.vec3i(0, 0, 0)
     for axis in range(3):
@@ -75,9 +82,10 @@ def _ratios_at(ratios: wp.array4d[wp.float64], low: wp.vec3i, place: wp.vec3):
         part *= wp.where(corner / 2 % 2 == 1, weight[1], 1.0 - weight[1])
         part *= wp.where(corner / 4 == 1, weight[2], 1.0 - weight[2])
         for channel in range(3):
-            first[channel] += wp.float64(part) * ratios[z, y, x, channel]
-            second[channel] += wp.float64(part) * ratios[z, y, x, 3 + channel]
-    return first, second
+            at_once[channel] += wp.float64(part) * ratios[z, y, x, channel]
+            later[channel] += wp.float64(part) * ratios[z, y, x, 3 + channel]
+            of_world[channel] += wp.float64(part) * ratios[z, y, x, 6 + channel]
+    return at_once, later, of_world
 
 
 @wp.kernel
@@ -96,21 +104,23 @@ def _find_texels(
     row = of.first_node + node
     even = sums[row, 3] + sums[row, 4] + sums[row, 5]
     known = even / (even + prior)
-    position = (float(node % NODES) + 0.5) / float(NODES) * float(of.point_count - 1)
+    position = (float(node % of.node_count) + 0.5) / float(of.node_count) * float(of.point_count - 1)
     below = wp.clamp(int(position), 0, of.point_count - 2)
-    first = of.first_point + node / NODES * of.point_count + below
+    first = of.first_point + node / of.node_count * of.point_count + below
     place = points[first] + (position - float(below)) * (points[first + 1] - points[first])
     light = rgb()
     rest = wp.float64(1.0)
-    at_once, later = _ratios_at(ratios, low, (place - corner) / voxel)
-    total = at_once + later
-    if even > wp.float64(0.0) and total[0] + total[1] + total[2] > wp.float64(0.0):
-        share = (at_once[0] + at_once[1] + at_once[2]) / (total[0] + total[1] + total[2])
-        rest = wp.float64(1.0) - known * share
+    at_once, later, of_world = _ratios_at(ratios, low, (place - corner) / voxel)
+    of_lamps = at_once[0] + at_once[1] + at_once[2] + later[0] + later[1] + later[2]
+    total = of_lamps + of_world[0] + of_world[1] + of_world[2]
+    if even > wp.float64(0.0) and of_lamps > wp.float64(0.0):
+        of_rest = (total - of_lamps) / total
+        rest = wp.float64(1.0) - known * (wp.float64(1.0) - of_rest)
         for channel in range(3):
             here = sums[row, channel] / wp.max(sums[row, 3 + channel], wp.float64(1e-12))
-            # Later light is a part of the voxel's, except for its color.
-            light[channel] = known * (here + later[channel] - (wp.float64(1.0) - share) * total[channel])
+            # Light of a world is a part of the voxel's, except for its color.
+            tint = of_world[channel] - of_rest * (at_once[channel] + later[channel] + of_world[channel])
+            light[channel] = known * (here + later[channel] + tint)
     out_texels[node] = wp.vec4(float(light[0]), float(light[1]), float(light[2]), float(rest))
 
 
@@ -118,26 +128,26 @@ class NodeSums:
     """(nodes, 6) sums over paths of a `StrandGrid`, zero at first: light at once, light in uniform light.
 
     Systems have no nodes if they are linked, as their sums are common, if the grid contains only some of their strands,
-    or if there are too many.
+    or if nodes as dense as voxels would be too many.
     """
 
     def __init__(self, grid: StrandGrid) -> None:
         self.grid = grid
         self._taken = self._even = 0.0  # number of paths, and all their light in uniform light
         self._systems: dict[int, _Strands] = {}
-        ends = [*(system.first_point for system in grid.thinned[1:]), len(grid.points)]
-        node_count = 0
-        for index, (system, end) in enumerate(zip(grid.thinned, ends, strict=True)):
-            count = (end - system.first_point) // system.point_count
+        first_node = 0
+        for index, system in enumerate(grid.thinned):
+            of = _Strands()
+            of.first_point, of.point_count, of.first_node = system.first_point, system.point_count, first_node
+            ends = [*(other.first_point for other in grid.thinned[1:]), len(grid.points)]
+            of.strand_count = (ends[index] - system.first_point) // system.point_count
             is_linked = grid.sums_of_systems.count(grid.sums_of_systems[index]) > 1
-            is_whole = system.stride == 1 and system.point_count > 1
-            if is_whole and not is_linked and 0 < count * NODES <= _MOST_NODES - node_count:
-                of = _Strands()
-                of.first_point, of.point_count = system.first_point, system.point_count
-                of.strand_count, of.first_node = count, node_count
-                self._systems[index] = of
-                node_count += count * NODES
-        self._sums = wp.zeros((node_count, 6), dtype=wp.float64, device=grid.device)
+            if of.strand_count and system.stride == 1 and system.point_count > 1 and not is_linked:
+                of.node_count = _nodes_of(grid, of, _MOST_NODES - first_node)
+                if of.node_count:
+                    self._systems[index] = of
+                    first_node += of.strand_count * of.node_count
+        self._sums = wp.zeros((first_node, 6), dtype=wp.float64, device=grid.device)
 
     def has(self, system: int) -> bool:
         """Whether a system, by its index, has nodes."""
@@ -168,14 +178,27 @@ class NodeSums:
         row_sums.add(self._sums, rows, light, even)
 
     def texels(self, system: int, ratios: wp.array4d[wp.float64], low: tuple[int, int, int]) -> np.ndarray:
-        """Return (S, NODES, 4) float32 of a system: RGB relative to the light in uniform light, to which the light of
+        """Return (S, nodes, 4) float32 of a system: RGB relative to the light in uniform light, to which the light of
         voxels is added with the weight in the fourth channel.
 
-        ratios: RGB of light at once, then of later light (Z, Y, X, 6), of the voxels from `low` on, along Z, Y, X.
+        ratios: RGB by `CHANNELS` (Z, Y, X, 9) of the voxels from `low` on, along Z, Y, X.
         """
         of, grid, device = self._systems[system], self.grid, self._sums.device
-        texels = wp.empty(of.strand_count * NODES, dtype=wp.vec4, device=device)
+        texels = wp.empty(of.strand_count * of.node_count, dtype=wp.vec4, device=device)
         prior = wp.float64(max(_PRIOR * self._even / max(self._taken, 1.0), 1e-30))
         given = [of, grid.points, wp.vec3(*grid.corner.tolist()), grid.voxel, ratios, wp.vec3i(*low), self._sums, prior]
         kernel_cache.launch(_find_texels, len(texels), given, [texels], device)
-        return texels.numpy().reshape(-1, NODES, 4)
+        return texels.numpy().reshape(-1, of.node_count, 4)
+
+
+def _nodes_of(grid, of, most):
+    """Return the number of nodes per strand of `_Strands` if there may be `most`; 0 if they would be sparse."""
+    width = int(light_texels.sides_of(grid.shape)[0])
+    count = min(most // of.strand_count, _MOST_OF_STRAND, width)
+    if count < _LEAST_OF_STRAND:
+        return 0
+    count = width // -(-width // count)  # whole strands fill rows of texels
+    points = grid.points[of.first_point : of.first_point + of.strand_count * of.point_count]
+    some = points.reshape((of.strand_count, of.point_count))[:: -(-of.strand_count // _SAMPLED)].numpy()
+    length = np.linalg.norm(np.diff(some, axis=1), axis=-1).sum(axis=1).mean()
+    return count if _LEAST_OF_STRAND <= count and length <= _LONGEST * grid.voxel * count else 0

@@ -346,7 +346,7 @@ def _by_voxels(kernel, voxels, inputs):
 
 
 def _box_of(sums):
-    """Return slices along Z, Y, X around all voxels of (Z, Y, X, 12) sums with data.
+    """Return slices along Z, Y, X around all voxels of (Z, Y, X, C) sums with data.
 
     The whole range if there is none. One hair system may occupy a small part of the grid.
     """

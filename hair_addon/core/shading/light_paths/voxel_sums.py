@@ -63,17 +63,17 @@ def _carry(
 
 
 class VoxelSums:
-    """(different hair, Z, Y, X, 12) sums over a `StrandGrid`, zero at first: `voxel_means.CHANNELS` of each voxel."""
+    """(different hair, Z, Y, X, C) sums over a `StrandGrid`, zero at first; by default `voxel_means.CHANNELS`."""
 
-    def __init__(self, grid: StrandGrid) -> None:
+    def __init__(self, grid: StrandGrid, channel_count: int = CHANNELS) -> None:
         self.grid = grid
         self._voxels = grid.shape[::-1]
         rows = (max(grid.sums_of_systems) + 1) * int(np.prod(self._voxels))
-        self._sums = wp.zeros((rows, CHANNELS), dtype=wp.float64, device=grid.device)
+        self._sums = wp.zeros((rows, channel_count), dtype=wp.float64, device=grid.device)
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
-        """Return the sums (Z, Y, X, 12) of each hair system: the same object for linked hair."""
-        count, shape = int(np.prod(self._voxels)), (*self._voxels, CHANNELS)
+        """Return the sums (Z, Y, X, C) of each hair system: the same object for linked hair."""
+        count, shape = int(np.prod(self._voxels)), (*self._voxels, self._sums.shape[1])
         firsts = range(0, len(self._sums), count)
         found = [self._sums[first : first + count].reshape(shape) for first in firsts]
         return [found[index] for index in self.grid.sums_of_systems]
