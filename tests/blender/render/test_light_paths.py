@@ -12,7 +12,7 @@ from mathutils import Vector
 from hair_addon import api
 from hair_addon.blender.render import light_paths
 from hair_addon.core.shading import presets
-from hair_addon.core.shading.light_paths import gather
+from hair_addon.core.shading.light_paths import gather, strand_nodes
 
 WHITE = replace(
     presets.PRESETS["WHITE"][1],
@@ -95,6 +95,34 @@ def test_strands_far_from_each_other_are_as_with_dual_scattering(scene):
     light(scene, sun=3.0)
     scene.camera.rotation_euler.y = 0.3  # upright strands cross the columns of samples
     found, expected = (mean_color(picture(scene, scattering)) for scattering in ("GRID", "DUAL"))
+    np.testing.assert_allclose(found, expected, rtol=0.04)
+
+
+def test_strands_have_the_light_of_their_own_nodes(scene, monkeypatch):
+    """Each strand has the light of its own nodes, from root to tip."""
+    x = np.linspace(-0.6, 0.6, 5)
+    hair_of(scene, np.stack([x, 0.0 * x, 0.0 * x], axis=-1), BROWN, radius=0.03)
+    light(scene, sun=3.0)
+    values = []
+
+    def texels(nodes, system, *_ratios):
+        of = nodes._systems[system]
+        strand, node = np.indices((of.strand_count, of.node_count))
+        light = np.zeros((*strand.shape, 4), np.float32)
+        light[..., :3] = values[-1](strand, (node + 0.5) / of.node_count)[..., None]
+        return light
+
+    monkeypatch.setattr(strand_nodes.NodeSums, "texels", texels)
+    drawn = []
+    for value in (lambda strand, along: 1.0 + 0.0 * strand * along, lambda strand, along: 1.0 + strand + 10.0 * along):
+        values.append(value)
+        drawn.append(picture(scene, "GRID")[..., :3].sum(axis=-1).reshape(64, 64))
+    even, changed = drawn
+    column = (32.0 + x / 1.6 * 64.0).astype(int)
+    rows = np.arange(24, 40)  # the middle of the strands
+    found = changed[rows][:, column] / even[rows][:, column]
+    height = ((rows + 0.5) / 64.0 - 0.5) * 1.6 / 0.5 + 0.5
+    expected = 1.0 + np.arange(5) + 10.0 * height[:, None]
     np.testing.assert_allclose(found, expected, rtol=0.04)
 
 

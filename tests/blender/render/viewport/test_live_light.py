@@ -17,7 +17,7 @@ from hair_addon.blender.data.pictures import light_panoramas
 from hair_addon.blender.render import drawn_scene, light_paths
 from hair_addon.blender.render.viewport import hair_picture, live_light
 from hair_addon.core.long_work import Stopped
-from hair_addon.core.shading.light_paths import gather
+from hair_addon.core.shading.light_paths import gather, light_texels
 from tests.blender.render.test_light_paths import BROWN, hair_of, light
 
 SIZE, PATHS = 48, 6_000
@@ -225,12 +225,23 @@ def test_the_light_of_a_pattern_that_turns_is_forgotten(view, monkeypatch):
 
 
 def test_light_moves_with_its_hair(view):
+    """Light moves with its hair. Nodes belong to strands by their numbers, so after a change of Strand Count only the
+    light of voxels is shown.
+    """
     camera, read = view
     live = live_light.LiveLight()
-    before = at_rest(live, read(), camera).lights["grid_corner"]
+    before = at_rest(live, read(), camera)
+    assert before.hair_visibility[0]["light_grid"] is live._textures[0]
+    assert len(live._texels[0]) > light_texels.sides_of(live._grid.shape)[2]
     bpy.data.objects["Hair"].location.x = 0.25
-    after = redrawn(live, read(), camera).lights["grid_corner"]
-    np.testing.assert_allclose(after - before, [0.25, 0.0, 0.0, 0.0], atol=1e-5)
+    after = redrawn(live, read(), camera)
+    moved = after.lights["grid_corner"] - before.lights["grid_corner"]
+    np.testing.assert_allclose(moved, [0.25, 0.0, 0.0, 0.0], atol=1e-5)
+    assert after.hair_visibility[0]["light_grid"] is live._textures[0]
+    bpy.data.hair_curves["Hair"].remove_curves(indices=list(range(100)))
+    fewer = redrawn(live, read(), camera, may_follow=False)
+    assert 0.0 < part_of(fewer) < 1.0
+    assert fewer.hair_visibility[0]["light_grid"] is live._of_voxels[0]
 
 
 @pytest.fixture
