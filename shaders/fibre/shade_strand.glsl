@@ -23,6 +23,7 @@
 #include "light/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not visible
+const float LEAST_LIGHT = 1e-7;  // of voxels, to which parts of light are relative
 
 struct SeenStrand {
   vec3 T;
@@ -109,14 +110,29 @@ vec3 strand_light(SeenStrand strand)
 }
 
 // Radiance if paths through a grid have measured all light: a fraction of dual scattering, plus the light of the grid.
+vec3 light_on_grid(SeenStrand strand, bool with_nodes)
+{
+  vec4 among = light_among_strands(drawn_position, strand_index, strand_position, with_nodes);
+  return max(among.a * strand_light(strand) + drawn_lobes.w * among.rgb * strand.returned, vec3(0.0));
+}
+
 vec3 strand_light_on_grid(SeenStrand strand)
 {
-  vec4 among = light_among_strands(drawn_position, strand_index, strand_position);
-  return among.a * strand_light(strand) + drawn_lobes.w * among.rgb * strand.returned;
+  if (!is_part_of_light() || !has_nodes()) {
+    return light_on_grid(strand, true);
+  }
+  // Nodes do not distinguish lobes: each part changes as all light does.
+  vec3 part = light_on_grid(strand, false);
+  draw_part(false);
+  vec3 before = light_on_grid(strand, false);
+  vec3 after = light_on_grid(strand, true);
+  draw_part(true);
+  return mix(drawn_lobes.w * after, part * after / max(before, vec3(LEAST_LIGHT)), step(vec3(LEAST_LIGHT), before));
 }
 
 vec4 sample_value()
 {
+  draw_part(true);
   SeenStrand strand = seen_strand();
   vec3 light = has_light_grid() ? strand_light_on_grid(strand) : strand_light(strand);
   return vec4(shown_light(light, strand.T, strand.V, strand.returned, open_direction), 1.0);

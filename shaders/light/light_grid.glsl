@@ -6,6 +6,12 @@ bool has_light_grid()
   return lights.grid_scale.x > 0.0;
 }
 
+// Without nodes the texture ends with the voxels.
+bool has_nodes()
+{
+  return float(textureSize(light_grid, 0).z) > lights.grid_scale.w;
+}
+
 // From the nodes of a strand: RGB, light as below; alpha, the fraction of the light of voxels to add.
 vec4 light_of_nodes(int strand, float position)
 {
@@ -23,15 +29,15 @@ vec4 light_of_nodes(int strand, float position)
 }
 
 // For visible strands around a position: RGB, the uniform radiance to which they would respond alike; alpha, the fraction of
-// light by dual scattering to add. Without nodes the texture ends with the voxels.
-vec4 light_among_strands(vec3 position, int strand, float along)
+// light by dual scattering to add.
+vec4 light_among_strands(vec3 position, int strand, float along, bool with_nodes)
 {
   float layers = lights.grid_scale.w;
   float depth = float(textureSize(light_grid, 0).z);
   vec3 at = (position - lights.grid_corner.xyz) * lights.grid_scale.xyz;
   at.z = clamp(at.z * layers, 0.5, layers - 0.5) / depth;
   vec4 measured = textureLod(light_grid, at, 0.0);
-  if (depth > layers) {
+  if (with_nodes && has_nodes()) {
     vec4 of_nodes = light_of_nodes(strand, along);
     measured = vec4(of_nodes.rgb, 0.0) + of_nodes.a * measured;
   }

@@ -321,7 +321,7 @@ class VisibilityBuffer:
             pass
         texture = self._parts[scene_programs.PICTURE_FORMAT, _NOTHING][1]
         for placed in self._hair:
-            self._shade(placed, texture, {"drawn_lobes": lobes, "drawn_world": world})
+            self._shade(placed, texture, {"part_lobes": lobes, "part_world": world})
         return texture
 
     def hair_at(self, x, y):
@@ -433,7 +433,7 @@ class VisibilityBuffer:
     def _shade(self, placed, picture, parts=None):
         """Fill the samples in which a hair is nearest with its light, or with parts of its light.
 
-        parts: constants of fibre/drawn_lobes.glsl.
+        parts: constants of fibre/part_of_lobes.glsl.
         """
         strands, objects = placed.batch.strands, placed.objects
         for shading, mix in placed.batch.shading.layers:

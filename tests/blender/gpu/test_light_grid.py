@@ -38,7 +38,7 @@ def test_light_is_between_voxels_and_nodes(scene, rng, strand_count, nodes, part
     found = glsl.evaluate(
         shaders.expand("light/light_grid.glsl")[0],
         "vec4",
-        "light_among_strands(position, int(strand), along)",
+        "light_among_strands(position, int(strand), along, true)",
         structs=uniforms.LIGHT.source + uniforms.LIGHTS.source,
         blocks={"lights": ("Lights", lights)},
         textures={"light_grid": light_grid.upload(light_texels.packed(voxels, of_nodes))},

@@ -188,8 +188,8 @@ def shading_program(
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; is_mapped: each strand has a look of its
     own, in the sampler of fibre/mapped_strand.glsl; is_radial: also a radial roughness of its own, in the sampler of
-    fibre/strand_radial.glsl; in_parts: draw a part of the light,
-    selected by the constants of fibre/drawn_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
+    fibre/strand_radial.glsl; in_parts: draw a part of the light, selected by the constants of
+    fibre/part_of_lobes.glsl; is_mixed: draw the share of one of two looks, by the constants
     of fibre/mixed_looks.glsl; is_solid: for Solid shading, by the block of fibre/solid_light.glsl; is_batch: of linked
     hair objects.
     """
@@ -213,9 +213,9 @@ def shading_program(
         replaced["fibre/shown_light.glsl"] = "fibre/solid_light.glsl"
         info.uniform_buf(2 + len(structs), uniforms.SOLID.type_name, "solid")
     if in_parts:
-        replaced["fibre/drawn_lobes.glsl"] = None
-        info.push_constant("VEC4", "drawn_lobes")
-        info.push_constant("FLOAT", "drawn_world")
+        replaced["fibre/drawn_lobes.glsl"] = "fibre/part_of_lobes.glsl"
+        info.push_constant("VEC4", "part_lobes")
+        info.push_constant("FLOAT", "part_world")
     if is_mixed:
         replaced["fibre/single_look.glsl"] = "fibre/mixed_looks.glsl"
         info.push_constant("VEC2", "wetness_range")
