@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from ...core.imaging.texture_sides import avoid_powers_of_two
+from ...core.texture_sides import avoid_powers_of_two
 from ..host.caches import Cache
 
 _GREATEST = 60000.0  # within the range of half floats

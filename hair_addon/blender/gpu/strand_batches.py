@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import gpu
 import numpy as np
 
-from ...core.imaging.texture_sides import avoid_powers_of_two
+from ...core.texture_sides import avoid_powers_of_two
 from . import drawing
 from .hair_shading import MixedShading, Shading
 from .programs import scene_programs

@@ -12,8 +12,8 @@ import gpu
 import numpy as np
 
 from ...core import geometry
-from ...core.imaging.texture_sides import avoid_powers_of_two
 from ...core.kernels.checks import require_count, require_indices
+from ...core.texture_sides import avoid_powers_of_two
 from ..host.caches import Cache
 from . import drawing, driver_textures, strand_batches
 from .programs import surface_programs, uniforms

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.imaging.texture_sides import avoid_powers_of_two
+from ...core.texture_sides import avoid_powers_of_two
 from ..gpu import drawing, driver_textures
 from ..gpu.programs import picture_programs, uniforms
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import light_grid, surface_textures
-from hair_addon.core.imaging.texture_sides import avoid_powers_of_two
+from hair_addon.core.texture_sides import avoid_powers_of_two
 
 
 def is_power(lengths):

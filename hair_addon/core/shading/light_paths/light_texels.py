@@ -8,7 +8,7 @@ The last texel contains the number of nodes per strand.
 
 import numpy as np
 
-from ...imaging.texture_sides import avoid_powers_of_two
+from ...texture_sides import avoid_powers_of_two
 
 _MOST_LAYERS = 2048  # which all graphics drivers allow
 
