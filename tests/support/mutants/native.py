@@ -140,9 +140,9 @@ def faults(name, count, seed, share=(0, 1), seconds=math.inf):
     number, last = asked.start, asked.stop
     while number < last and time.monotonic() < end:
         words = [sys.executable, "-m", "tests.support.mutants.native", "child", name, str(number), str(last)]
-        process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-        before = number
-        seen = _watch(process, end)
+        before, details = number, {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
+        with subprocess.Popen(words, cwd=ROOT, **details) as process:
+            seen = _watch(process, end)
         for line in seen.lines:
             kind, _, rest = line.partition(" ")
             if kind == "at":
