@@ -200,10 +200,11 @@ def unstyled(
 
 
 def _are_same(inputs, others):
-    if (inputs.masks.keys(), inputs.cutters.keys(), inputs.targets.keys()) != (
+    if (inputs.masks.keys(), inputs.cutters.keys(), inputs.targets.keys(), inputs.guide_sets.keys()) != (
         others.masks.keys(),
         others.cutters.keys(),
         others.targets.keys(),
+        others.guide_sets.keys(),
     ):
         return False
     pairs = []
@@ -213,6 +214,7 @@ def _are_same(inputs, others):
     pairs += [(cutter.point, others.cutters[name].point) for name, cutter in inputs.cutters.items()]
     pairs += [(cutter.normal, others.cutters[name].normal) for name, cutter in inputs.cutters.items()]
     pairs += [(target, others.targets[name]) for name, target in inputs.targets.items()]
+    pairs += [(are_chosen, others.guide_sets[name]) for name, are_chosen in inputs.guide_sets.items()]
     return all(_equal(*pair) for pair in pairs)
 
 

@@ -18,12 +18,12 @@ from .translations import CONTEXT
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 
 
-def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset()):
+def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset(), searches=None):
     """Return {name: bpy property} for the fields of a `Settings` class except `skip`; `update` as in bpy.props.
 
     A radius also gets a diameter property, which is shown in its place. Operators have no `update`, and do not keep
     text, which names data of one file. Structural settings and those of `unkeyed` cannot be keyed. high: {name:
-    maximum} of fields with a shorter range here.
+    maximum} of fields with a shorter range here; searches: {name: function that suggests values}, as in bpy.props.
     """
     highs = high or {}
     made = {}
@@ -36,7 +36,8 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, ove
             update = fitted_sizes.by_hand(name, mark) if mark is not None and name in sizes else mark
             details = replace(details, high=highs.get(name, details.high))
             is_unkeyed = details.is_structural or name in unkeyed
-            made[name] = _property(name, default, details, update, is_unkeyed, set(override))
+            search = (searches or {}).get(name)
+            made[name] = _property(name, default, details, update, is_unkeyed, set(override), search)
             if mark is not None and _is_length(default, details):
                 made[length_steps.coarse_name(name)] = _coarse_property(name, details)
             if details.diameter is not None:
@@ -45,7 +46,7 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, ove
     return made
 
 
-def _property(name, default, details, update, is_unkeyed, override):
+def _property(name, default, details, update, is_unkeyed, override, search):
     common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
     common["translation_context"], common["override"] = CONTEXT, override
     if is_unkeyed:
@@ -59,7 +60,7 @@ def _property(name, default, details, update, is_unkeyed, override):
             return bpy.props.EnumProperty(items=details.choices, **common)
         if update is None:
             common["options"] = common.get("options", set()) | {"SKIP_SAVE"}
-        return bpy.props.StringProperty(**common)
+        return bpy.props.StringProperty(**common, **({} if search is None else {"search": search}))
     if isinstance(default, bool):
         return bpy.props.BoolProperty(**common)
     limits = _limits(details, isinstance(default, int))

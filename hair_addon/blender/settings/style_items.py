@@ -13,17 +13,25 @@ from ...core.params import declared
 from ...core.styling import fitting
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
 from ..host.notices import text_of
-from . import map_items, setting_properties, style_keys
+from . import map_items, selection_names, setting_properties, style_keys
 from .marks import mark_geometry, mark_wet_style
 from .translations import CONTEXT
 
 _UNKEYED = ("seed",)  # strands would jump
 
 
+def _saved_selections(group, _context, _typed):
+    guides = group.id_data.vellus.guide_curves
+    return [] if guides is None else selection_names.names_of(guides)
+
+
+_SEARCHES = {"center_guides": _saved_selections}  # {name: function that suggests values}
+
+
 def _group_class(kind):
     """Return a property group class for the settings of a kind. Wetness also changes shading and motion."""
     update = mark_wet_style if kind == "WET" else mark_geometry
-    annotations = setting_properties.annotations(KINDS[kind], update, unkeyed=_UNKEYED)
+    annotations = setting_properties.annotations(KINDS[kind], update, unkeyed=_UNKEYED, searches=_SEARCHES)
     contents = {"__doc__": DESCRIPTIONS[kind], "__annotations__": annotations, "__module__": __name__}
     return type(f"Vellus{LABELS[kind]}", (bpy.types.PropertyGroup,), contents)
 
@@ -140,6 +148,12 @@ def masks_of(item):
 def have_masks(state):
     """Whether any style of a hair's settings has a mask."""
     return any(any(masks_of(item)) for item in state.styles)
+
+
+def center_guides_of(state):
+    """Names of the selections of guides at the centers of a hair's locks."""
+    clumps = (item.clump for item in state.styles if item.kind == "CLUMP" and item.clump.centers == "GUIDES")
+    return {text_of(group, "center_guides") for group in clumps} - {""}
 
 
 def objects_named(state):

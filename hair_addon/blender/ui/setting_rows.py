@@ -32,6 +32,7 @@ _BLENDING = ("neighbour_limit", "keep_length", "guide_map", "seed")
 
 _MASK = ("mask", "mask_image", "invert_mask")
 _STYLE_OBJECTS = ("cutter", "target")
+_CENTERS = ("centers", "center_guides", "size")
 _PROFILE = tuple(
     name
     for name in setting_properties.names_of(ProfiledSettings)
@@ -207,14 +208,28 @@ def style_rows(layout, item):
     """Settings of a style except its mask and profile; item: its properties."""
     owner, settings_class = style_items.group_of(item), KINDS[item.kind]
     rows(layout, owner, settings_class, ("amount",), text_of(item, "name"))
-    shared = setting_properties.names_of(StyleSettings)
-    rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS), text_of(item, "name"))
+    shared, name = setting_properties.names_of(StyleSettings), text_of(item, "name")
+    centers = _CENTERS if item.kind == "CLUMP" else ()
+    if centers:
+        _center_rows(layout, owner, settings_class, name)
+    rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS, centers), name)
     for name in _STYLE_OBJECTS:
         if name in owner.bl_rna.properties:
             column = layout.column()
             column.active = name != "target" or owner.direction == "OBJECT"
             search_row(column, owner, name, bpy.data, "objects")
     rows(layout, owner, settings_class, others(StyleSettings, ("is_on", "amount"), _MASK), text_of(item, "name"))
+
+
+def _center_rows(layout, owner, settings_class, style):
+    """Centers of locks; the size is gray if no level has it."""
+    rows(layout, owner, settings_class, ("centers",))
+    is_at_guides = owner.centers == "GUIDES"
+    if is_at_guides:
+        rows(layout, owner, settings_class, ("center_guides",))
+    column = layout.column()
+    column.active = not is_at_guides or owner.levels > 1
+    rows(column, owner, settings_class, ("size",), style)
 
 
 def profile_rows(layout, item):

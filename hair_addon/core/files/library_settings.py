@@ -12,7 +12,7 @@ S = TypeVar("S", bound=Settings)
 
 # Settings that name an object or an image of the scene: of each section, and of styles.
 _NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
-_NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target")
+_NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target", "center_guides")
 _OTHER_MAPS = ("IMAGE", "CURVES")  # kinds of maps with the name of an image, or of an attribute of strands
 _MASK_MAPS = ("GROUP", "ATTRIBUTE")  # kinds of maps with the name of a mask
 _MASKS = {"guides": ("density_group",), "hair": ("density_group", "region_group")}

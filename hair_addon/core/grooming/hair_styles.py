@@ -86,7 +86,7 @@ def bind_styles(
     if cut is None and is_plain(guides, settings, styles):
         return None
     inputs = Inputs() if inputs is None else inputs
-    varied = styling.varied_numbers.varied_trees(styles, inputs.numbers, binding)
+    varied = styling.varied_numbers.varied_trees(styles, inputs.numbers, binding, inputs.guide_sets)
     own = {place: found.tree for place, found in varied.items()}
     trees.search([tree for tree, _level in styling.program.tree_levels(styles, own)], progress)
     if cut is not None or settings.strand_length != 1.0:

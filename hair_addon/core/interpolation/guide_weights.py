@@ -22,7 +22,7 @@ import warp as wp
 
 from ..geometry.search import hash_grid
 from ..kernels import kernel_cache, parallel
-from ..kernels.checks import require_count
+from ..kernels.checks import require_count, require_indices
 from ..kernels.parallel import Rows
 from . import cpu_weights, part_lines, sharp_edges
 
@@ -153,6 +153,18 @@ def find_candidates(
         candidates, ways = _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions)
     sharp_edges.go_around(normals, guide_normals, candidates, ways)
     return Candidates(candidates, ways, len(guide_roots))
+
+
+def only_candidates(guides: np.ndarray, guide_count: int, neighbour_limit: int, device: wp.DeviceLike) -> Candidates:
+    """Return the `Candidates` of strands that follow one guide each; guides: (S,) indices below guide_count.
+
+    neighbour_limit: k.
+    """
+    require_indices("guides", guides, guide_count)
+    indices = np.full((len(guides), neighbour_limit + 1), -1, np.int32)
+    ways = np.full(indices.shape, np.inf, np.float32)
+    indices[:, 0], ways[:, 0] = guides, 1.0  # a lone guide has a weight of one at any finite distance
+    return Candidates(wp.array(indices, device=device), wp.array(ways, device=device), guide_count)
 
 
 def weigh(

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import geometry, interpolation
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
+from ..kernels.checks import require_indices
 from .hair_binding import HairBinding, weighed
 from .regions import Regions
 
@@ -50,6 +51,21 @@ class RootBinder:
             lines=self.lines,
         )
         at_roots, at_guides = (root_positions, root_normals), (positions(self.mesh, self.guide_roots), guide_normals)
+        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
+
+    def bind_guides(self, chosen: np.ndarray) -> HairBinding:
+        """Return the `HairBinding` of strands at the roots of guides (K,) int32; each follows its own guide alone.
+
+        Raises `HairError` for guides that do not exist.
+        """
+        require_indices("guides", chosen, len(self.guide_roots))
+        require_indices("guides", chosen, len(self.guide_roots))
+        roots = self.guide_roots[chosen]
+        at_roots = geometry.root_frames.rooted(self.mesh, roots, self.device)
+        at_guides = positions(self.mesh, self.guide_roots), self._guide_frames[1]
+        candidates = interpolation.guide_weights.only_candidates(
+            chosen, len(self.guide_roots), self.settings.neighbour_limit, self.device
+        )
         return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:

@@ -99,13 +99,20 @@ class TreeSettings:
     """Inputs for the clump sites of a style.
 
     sizes: distance between the sites of each level [m], the largest first; crossover: fraction of the strands that
-    belong to the second nearest site; variants: the trees that strands choose among if their sizes differ.
+    belong to the second nearest site; variants: the trees that strands choose among if their sizes differ; guides:
+    indices of the guides that are the sites of the first level, None for sites that are placed.
     """
 
     sizes: tuple[float, ...]
     seed: int
     crossover: float
     variants: "tuple[TreeSettings, ...]" = ()
+    guides: tuple[int, ...] | None = None
+
+    @property
+    def placed_sizes(self) -> tuple[float, ...]:
+        """Distances between the sites [m] of the levels whose sites are placed."""
+        return self.sizes if self.guides is None else self.sizes[1:]
 
 
 @dataclass(frozen=True)

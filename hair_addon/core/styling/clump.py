@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Clump: strands gather around center strands, which are spaced evenly on the surface and are not part of the hair.
+"""Clump: strands gather around center strands, which are not part of the hair.
+
+Centers are spaced evenly on the surface; those of the largest locks may also be chosen guides.
 
 At the arc length s_i of a point p_i, with C the center strand of level k after the levels before, and c = C(s_i):
 
@@ -18,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..params import param, param_of
-from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
+from .base import Cutter, ProfiledSettings, Step, StyleSettings, TreeSettings, step_of
 
 LABEL = "Clump"
 DESCRIPTION = "Gather strands into locks, and locks into larger ones"
@@ -30,11 +32,20 @@ NEEDS_CENTRE = True
 NUMBERS = ("thickness", "twist", "stray")  # of clump.strand
 COURSES = ("amount", "thickness", "twist")
 
+CENTERS = (
+    ("AUTOMATIC", "Automatic", "At places that are spaced evenly on the surface"),
+    ("GUIDES", "Guides", "At guides"),
+)
+
 
 @dataclass(frozen=True)
 class Settings(ProfiledSettings):
-    """Size and strength of locks."""
+    """Centers, size and strength of locks."""
 
+    centers: str = param("AUTOMATIC", "Where the centers of the largest locks are", choices=CENTERS, is_structural=True)
+    center_guides: str = param(
+        "", "Saved selection of the guides at the centers; if empty, all guides", label="Selection", is_structural=True
+    )
     size: float = param(
         0.012,
         "Distance between the centers of the largest locks",
@@ -113,6 +124,13 @@ def sizes(settings: Settings) -> list[float]:
     return [settings.size * settings.ratio**level for level in range(settings.levels)]
 
 
+def guide_set(settings: StyleSettings) -> str | None:
+    """Return the name of the selection of guides at the centers of a style, "" for all guides; None without."""
+    if not isinstance(settings, Settings) or settings.centers != "GUIDES":
+        return None
+    return settings.center_guides
+
+
 def amounts(settings: Settings) -> list[Any]:
     """Return the strength of each level's locks, the largest first. All are zero if the amount is zero.
 
@@ -123,7 +141,7 @@ def amounts(settings: Settings) -> list[Any]:
 
 
 def tree(settings: Settings) -> TreeSettings:
-    """Return the inputs of the clump sites."""
+    """Return the inputs of the clump sites, without the indices of chosen guides."""
     return TreeSettings(tuple(sizes(settings)), settings.seed, settings.crossover)
 
 

@@ -3,7 +3,8 @@
 
 Sites are evenly spaced on the surface and are not roots of the hair, so a strand's clump depends only on its own root.
 A strand belongs to the nearest site of the finest level, and a site to the nearest site of the next coarser level, so
-locks consist of whole smaller locks. Strands and sites in a region without sites belong to none.
+locks consist of whole smaller locks. Strands and sites in a region without sites belong to none. Sites of the first
+level may be the roots of chosen guides: a center there is the guide itself, without its neighbors.
 """
 
 import math
@@ -37,7 +38,7 @@ def site_count(area: float, size: float) -> int:
 
 def size_factor(area: float, tree: TreeSettings) -> float:
     """Return the factor for the sizes of a tree on an area [m²] so that no level has more than `MOST_SITES`."""
-    return max(math.sqrt(area / (_HEXAGON * MOST_SITES)) / min(tree.sizes), 1.0)
+    return max(math.sqrt(area / (_HEXAGON * MOST_SITES)) / min(tree.placed_sizes, default=math.inf), 1.0)
 
 
 @dataclass
@@ -62,19 +63,34 @@ class ClumpTrees:
         """
         if tree not in self._levels and tree.variants:
             found = [self.levels(variant, progress) for variant in tree.variants]
-            self._levels[tree] = [self._joined(levels) for levels in zip(*found, strict=True)]
+            joined = [self._joined(levels) for levels in zip(*found, strict=True)]
+            self._levels[tree] = joined if tree.guides is None else [*self._at_guides(tree), *joined[1:]]
         elif tree not in self._levels and (known := self._of_same_sites(tree)) is not None:
             self._levels[tree] = known
         elif tree not in self._levels:
-            counts = self.site_counts(tree)
-            ends = [0.0, *(sum(counts[: level + 1]) / sum(counts) for level in range(len(counts)))]
-            self._levels[tree] = [
-                self.binder.bind(self.place(count, tree.seed + level, part_of(progress, ends[level], ends[level + 1])))
-                for level, count in enumerate(counts)
-            ]
+            self._levels[tree] = [*self._at_guides(tree), *self._at_sites(tree, progress)]
         else:
             self._levels[tree] = self._levels.pop(tree)  # most recently used
         return self._levels[tree]
+
+    def _at_guides(self, tree):
+        """Return the binding of the first level of a tree at chosen guides; empty for other trees."""
+        if tree.guides is None:
+            return []
+        chosen = np.array(tree.guides, np.int32)
+        return [self.binder.bind_guides(np.tile(chosen, max(len(tree.variants), 1)))]
+
+    def _at_sites(self, tree, progress):
+        """Return the bindings of the levels of a tree whose sites are placed."""
+        counts = self.site_counts(tree)
+        ends = [0.0, *(sum(counts[: place + 1]) / sum(counts) for place in range(len(counts)))]
+        first = len(tree.sizes) - len(counts)
+        return [
+            self.binder.bind(
+                self.place(count, tree.seed + first + place, part_of(progress, ends[place], ends[place + 1]))
+            )
+            for place, count in enumerate(counts)
+        ]
 
     def _of_same_sites(self, tree):
         """Return the known levels of a tree with the same sites and another crossover; None without such a tree."""
@@ -90,9 +106,9 @@ class ClumpTrees:
         return self.binder.bind(roots)
 
     def site_counts(self, tree: TreeSettings) -> list[int]:
-        """Return the number of sites of each level, the coarsest first."""
+        """Return the number of sites of each level whose sites are placed, the coarsest first."""
         factor = size_factor(self.area, tree)
-        return [site_count(self.area, factor * size) for size in tree.sizes]
+        return [site_count(self.area, factor * size) for size in tree.placed_sizes]
 
     def search(self, trees: Collection[TreeSettings], progress: Progress = no_progress) -> None:
         """Compute the centers of trees that are missing; progress as in `levels`."""

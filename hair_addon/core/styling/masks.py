@@ -87,7 +87,8 @@ class Inputs:
     """Masks by `program.mask_key`; planes of cutters and directions of targets by the names of objects.
 
     numbers: values that differ between strands, by (index of the style, name of its setting);
-    courses: curves from root to tip of numbers, by the same keys.
+    courses: curves from root to tip of numbers, by the same keys;
+    guide_sets: (G,) bool, the guides of selections at the centers of locks, by the names of selections.
     """
 
     masks: Mapping[tuple[str, str, bool], Mask | CutMask] = field(default_factory=dict)
@@ -95,3 +96,4 @@ class Inputs:
     targets: Mapping[str, np.ndarray] = field(default_factory=dict)
     numbers: Mapping[tuple[int, str], NumberMap] = field(default_factory=dict)
     courses: Courses = field(default_factory=dict)
+    guide_sets: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -14,13 +14,16 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
+from ..errors import HairError
 from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
+from ..kernels.checks import require_count
 from ..params import declared
-from . import kinds, program
+from . import clump, kinds, program
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
 
 MOST_SIZES = 8
@@ -114,7 +117,7 @@ class _Structural:
 
 @dataclass(frozen=True, eq=False)
 class VariedTree:
-    """The tree of a style whose locks differ in size between strands.
+    """The tree of a style whose locks differ in size between strands, or have their centers at chosen guides.
 
     parts: the numbers that differ; tree: has a variant for each combination of their values, the last number fastest.
     """
@@ -131,15 +134,24 @@ class VariedTree:
 
 
 def varied_trees(
-    styles: Sequence[StyleSettings], numbers: Mapping[tuple[int, str], NumberMap], binding: HairBinding
+    styles: Sequence[StyleSettings],
+    numbers: Mapping[tuple[int, str], NumberMap],
+    binding: HairBinding,
+    guide_sets: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> dict[int, VariedTree]:
-    """Return {index of the style: its `VariedTree`} of styles whose locks differ in size between bound strands."""
+    """Return {index of the style: its `VariedTree`} of styles whose locks differ in size between bound strands, or have
+    their centers at chosen guides.
+
+    guide_sets: as in `masks.Inputs`. Raises `HairError` for a missing or empty selection.
+    """
     found = {}
+    at_guides = trees_at_guides(styles, guide_sets, len(binding.guide_positions))
     for place, settings in enumerate(styles):
         base = program.tree_settings(settings) if has_effect(settings) else None
         known = [details for details in declared(type(settings)) if details[2].is_structural]
         varied = {name: numbers[place, name] for name, _default, _details in known if (place, name) in numbers}
-        if base is None or not varied or not len(binding.roots):
+        base = at_guides.get(place, base)
+        if base is None or not (varied or place in at_guides) or not len(binding.roots):
             continue
         lengths = [details.unit == "LENGTH" for name, _default, details in known if name in varied]
         read = [number.read(binding.roots, binding.identities[0], None) for number in varied.values()]
@@ -148,10 +160,36 @@ def varied_trees(
         combinations = itertools.product(*(each.tolist() for each in values))
         changed = (replace(settings, **dict(zip(varied, chosen, strict=True))) for chosen in combinations)
         trees = (program.tree_settings(each) for each in changed)
-        variants = tuple(tree for tree in trees if tree is not None)
+        variants = tuple(replace(tree, guides=base.guides) for tree in trees if tree is not None)
         tree = variants[0] if len(variants) == 1 else replace(base, variants=variants)
         found[place] = VariedTree(parts, tree)
     return found
+
+
+def trees_at_guides(
+    styles: Sequence[StyleSettings], guide_sets: Mapping[str, np.ndarray], guide_count: int
+) -> dict[int, TreeSettings]:
+    """Return {index of the style: its tree} of styles whose centers are chosen guides.
+
+    guide_sets: as in `masks.Inputs`. Raises `HairError` for a missing or empty selection.
+    """
+    found = {}
+    for place, settings in enumerate(styles):
+        tree, name = program.tree_settings(settings), clump.guide_set(settings)
+        if tree is not None and name is not None and has_effect(settings):
+            found[place] = replace(tree, guides=_guides_of(name, guide_sets, guide_count))
+    return found
+
+
+def _guides_of(name, guide_sets, guide_count):
+    """Return the rising indices of the guides of a selection, "" for all."""
+    if name and name not in guide_sets:
+        raise HairError('The guides have no selection "{name}" for the centers of Clump: pick another.', name=name)
+    are_chosen = guide_sets[name] if name else np.ones(guide_count, bool)
+    require_count("guides", len(are_chosen), guide_count)
+    if not are_chosen.any():
+        raise HairError('The selection "{name}" for the centers of Clump has no guides: pick another.', name=name)
+    return tuple(np.flatnonzero(are_chosen).tolist())
 
 
 def _values_of_trees(read, lengths, own):

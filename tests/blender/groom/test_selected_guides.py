@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import attributes, selection_sets
+from hair_addon.blender.settings import selection_names
 from hair_addon.blender.ui import panels
 from tests.support.interface.layout import draw
 
@@ -31,7 +32,7 @@ def test_a_saved_selection_comes_back(guides, domain):
         choose(guides, indices, domain)
         expected[name] = selection_sets.selected(guides)
         assert bpy.ops.vellus.save_selection(name=name) == {"FINISHED"}
-    assert selection_sets.names(guides) == ["Fringe", "Left"]
+    assert selection_names.names_of(guides) == ["Fringe", "Left"]
     left, fringe = expected["Left"], expected["Fringe"]
     for name, mode, wanted in (
         ("Left", "SET", left),
@@ -44,7 +45,7 @@ def test_a_saved_selection_comes_back(guides, domain):
     layout = draw(panels.guides.VELLUS_PT_guides_selections)
     assert layout.drawn["vellus.select_saved"] == 2 and "Fringe" in layout.buttons
     bpy.ops.vellus.remove_selection(name="Left")
-    assert selection_sets.names(guides) == ["Fringe"]
+    assert selection_names.names_of(guides) == ["Fringe"]
 
 
 def test_all_and_no_selected_points_are_extended_and_reduced_as_others(guides):

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clump gathers strands on their center's line, in locks of whole smaller locks."""
 
+from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
+from hair_addon.core.grooming import following
 from hair_addon.core.interpolation import sharp_edges
 from hair_addon.core.long_work import Stopped
 from hair_addon.core.styling import braid, clump, clump_trees, program
+from hair_addon.core.styling.masks import Inputs
+from hair_addon.core.styling.varied_numbers import NumberMap
 from tests.support.dynamics.stepped import curved_strands, largest_move, stepped, straight_strands
-from tests.support.strands.styled import head, straight
+from tests.support.strands.styled import ball, head, straight
 
 FULL = clump.Settings(thickness=0.0, stray=0.0, root=1.0, tip=1.0, levels=1)
 
@@ -242,3 +247,92 @@ def test_more_strength_gathers_more(hair):
         locks = hair.bound(settings).clumps()[0]
         spreads.append(np.mean([points[locks == lock, 20].std(axis=0).sum() for lock in np.unique(locks)]))
     assert np.all(np.diff(spreads) < 0.0)
+
+
+AT_GUIDES = clump.Settings(centers="GUIDES", center_guides="Some", levels=1, crossover=0.0, stray=0.0)
+
+
+def chosen_of(hair, step=5):
+    """Return `Inputs` with the selection of every so many guides."""
+    return Inputs(guide_sets={"Some": np.arange(len(hair.guides.roots)) % step == 2})
+
+
+@pytest.mark.parametrize("settings", [AT_GUIDES, replace(AT_GUIDES, center_guides="")])
+def test_chosen_guides_are_the_centers_of_the_strands_nearest_to_them(hair, settings):
+    """Centers are the chosen guides, all without a selection, and strands join the nearest by brute force."""
+    inputs, guides = chosen_of(hair), hair.guides.numpy()
+    chosen = guides[inputs.guide_sets["Some"]] if settings.center_guides else guides
+    bound = hair.bound(settings, inputs=inputs)
+    level = bound.levels[0].binding
+    np.testing.assert_allclose(level.positions.numpy(), chosen[:, 0], atol=1e-6)
+    apart = np.linalg.norm(hair.binding.positions.numpy()[:, None] - chosen[:, 0], axis=-1)
+    members = bound.data.members.numpy()[0]
+    is_nearest = apart[np.arange(len(apart)), members] <= apart.min(axis=1) + 1e-6
+    facing = np.einsum("sc,sc->s", hair.binding.normals.numpy(), level.normals.numpy()[apart.argmin(axis=1)])
+    assert np.all(is_nearest | (facing < np.cos(sharp_edges.BEGIN))) and is_nearest.mean() > 0.9
+    centres = following.strands_now(level, hair.guides, following.weights_now(level, hair.guides)).numpy()
+    np.testing.assert_allclose(centres, chosen, atol=1e-5)
+
+
+def test_strands_end_on_the_guides_at_the_centers(rng):
+    """Also between guides that lean in different directions, where a blended center would end beside its guide."""
+    upright = straight(400, 0.2, 0.06)
+    points = upright.guides.numpy().copy()
+    points += np.linspace(0.0, 0.05, 41)[:, None] * rng.normal(size=(len(points), 1, 3)) * [1.0, 1.0, 0.0]
+    guides = strands.from_numpy(np.float32(points), upright.guides.roots)
+    settings = replace(AT_GUIDES, thickness=0.0, root=1.0)
+    inputs = chosen_of(upright)
+    made = upright.styled(settings, inputs=inputs, guides=guides)
+    members = upright.bound(settings, inputs=inputs).data.members.numpy()[0]
+    assert len(np.unique(members)) == inputs.guide_sets["Some"].sum()
+    own = points[inputs.guide_sets["Some"]][members]
+    courses = [points[:, -1] - points[:, 0] for points in (upright.styled(guides=guides), own)]
+    plain, center = (course / np.linalg.norm(course, axis=1, keepdims=True) for course in courses)
+    is_inside = np.sum(plain * center, axis=1) > np.cos(np.radians(25.0))
+    away = np.array([distances_to(line, tip) for line, tip in zip(own, made[:, -1], strict=True)])
+    assert is_inside.mean() > 0.8 and away[is_inside].max() < 1e-4
+
+
+def test_finer_locks_are_as_before_and_join_the_nearest_guide(hair):
+    finer = replace(AT_GUIDES, levels=3, size=0.03, ratio=0.5)
+    at_guides, automatic = (
+        hair.bound(settings, inputs=chosen_of(hair)) for settings in (finer, replace(finer, centers="AUTOMATIC"))
+    )
+    for level in (1, 2):
+        one, other = (bound.levels[level].binding.positions.numpy() for bound in (at_guides, automatic))
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_array_equal(at_guides.data.members.numpy()[1:3], automatic.data.members.numpy()[1:3])
+    for coarse, fine in pairwise(at_guides.data.members.numpy()[:3]):
+        assert len(np.unique(np.stack([coarse, fine]), axis=1).T) == len(np.unique(fine))
+
+
+@pytest.mark.parametrize("factor", [0.01, 100.0])
+def test_locks_at_guides_scale_with_the_surface(factor):
+    fur = ball(200)
+    larger = copy(fur)
+    larger.mesh = replace(fur.mesh, vertices=np.float32(factor * fur.mesh.vertices))
+    larger.guides = strands.from_numpy(np.float32(factor * fur.guides.numpy()), fur.guides.roots)
+    larger = larger.rooted(fur.binding.roots)
+    inputs = chosen_of(fur)
+    one, other = (each.styled(AT_GUIDES, inputs=inputs) for each in (fur, larger))
+    np.testing.assert_allclose(other / factor, one, atol=1e-4)
+    assert np.abs(one - fur.plain).max() > 0.01
+
+
+def test_sizes_by_a_map_share_the_chosen_guides(hair):
+    settings = replace(AT_GUIDES, levels=2, size=0.04)
+    number = NumberMap(lambda roots, ids, _clumps: np.where(ids % 2 == 0, 0.04, 0.02))
+    inputs = replace(chosen_of(hair), numbers={(0, "size"): number})
+    varied = hair.styled(settings, inputs=inputs)
+    for size in (0.04, 0.02):
+        alone = hair.styled(replace(settings, size=size), inputs=chosen_of(hair))
+        own = number.read(None, hair.binding.identities[0], None) == size
+        np.testing.assert_array_equal(varied[own], alone[own])
+
+
+@pytest.mark.parametrize("are_chosen", [None, np.zeros(60, bool), np.ones(59, bool), np.ones(61, bool)])
+def test_selections_that_do_not_fit_are_refused(hair, are_chosen):
+    sets = {} if are_chosen is None else {"Some": are_chosen}
+    with pytest.raises(HairError, match=r"selection|Hair data does not match"):
+        hair.bound(AT_GUIDES, inputs=Inputs(guide_sets=sets))
+    hair.bound(replace(AT_GUIDES, is_on=False), clump.Settings(), inputs=Inputs(guide_sets=sets))

@@ -3,31 +3,34 @@
 
 import numpy as np
 
-from ...host.notices import name_of
+from ...settings.selection_names import PREFIX
 from . import attributes, curves, guide_curves
 
-_PREFIX = "selection_"
 
-
-def names(datablock):
-    """Return the sorted names of the selection sets of guides."""
-    found = [name_of(one) for one in datablock.attributes if (one.data_type, one.domain) == ("BOOLEAN", "POINT")]
-    return sorted(name.removeprefix(_PREFIX) for name in found if name.startswith(_PREFIX))
+def has(datablock, name):
+    """Whether there is a set of this name."""
+    return attributes.has(datablock, PREFIX + name, "BOOLEAN", "POINT")
 
 
 def read(datablock, name):
     """Return (N,) bool: the points of a set; None if there is no set of this name."""
-    return attributes.read(datablock, _PREFIX + name, "BOOLEAN", "POINT")
+    return attributes.read(datablock, PREFIX + name, "BOOLEAN", "POINT")
+
+
+def read_guides(datablock, name):
+    """Return (G,) bool: the guides with points in a set; None if there is no set of this name."""
+    are_chosen = read(datablock, name)
+    return None if are_chosen is None else _of_curves(datablock, are_chosen)
 
 
 def write(datablock, name, are_chosen):
     """Store the chosen points (N,) bool as a set; a set of this name is replaced."""
-    attributes.write(datablock, _PREFIX + name, "BOOLEAN", "POINT", are_chosen)
+    attributes.write(datablock, PREFIX + name, "BOOLEAN", "POINT", are_chosen)
 
 
 def remove(datablock, name):
     """Remove a set."""
-    datablock.attributes.remove(datablock.attributes[_PREFIX + name])
+    datablock.attributes.remove(datablock.attributes[PREFIX + name])
 
 
 def selected(datablock):
@@ -45,6 +48,11 @@ def select(datablock, are_chosen):
     """Select points (N,) bool of guides; whole guides if Blender selects whole curves."""
     domain, values = "POINT", are_chosen
     if datablock.selection_domain == "CURVE":
-        domain, values = "CURVE", np.logical_or.reduceat(are_chosen, curves.curve_offsets(datablock)[:-1])
+        domain, values = "CURVE", _of_curves(datablock, are_chosen)
     attributes.write(datablock, guide_curves.SELECTION, "BOOLEAN", domain, values)
     datablock.update_tag()
+
+
+def _of_curves(datablock, are_chosen):
+    """Return (N,) bool: the curves with any of the chosen points (M,) bool."""
+    return np.logical_or.reduceat(are_chosen, curves.curve_offsets(datablock)[:-1])

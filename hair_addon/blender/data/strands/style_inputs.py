@@ -8,13 +8,13 @@ import numpy as np
 
 from ....core import geometry
 from ....core.errors import HairError
-from ....core.styling import lean, trim
+from ....core.styling import clump, lean, trim
 from ....core.styling.base import Cutter, StyleSettings, has_effect
 from ....core.styling.masks import Inputs, Mask
 from ....core.styling.program import mask_keys
 from ...host.notices import name_of
 from .. import scene
-from . import attributes
+from . import attributes, selection_sets
 
 # Luminance of linear colors, Rec. 709.
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
@@ -34,7 +34,14 @@ def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings],
         if isinstance(settings, lean.Settings) and settings.direction == "OBJECT" and settings.target:
             matrix = _matrix_of(settings.target, "Lean")
             targets[settings.target] = _z_axis(matrix, settings.target)
-    return Inputs(masks, cutters, targets)
+    return Inputs(masks, cutters, targets, guide_sets=guide_sets(guide_curves, active))
+
+
+def guide_sets(guide_curves, styles: Sequence[StyleSettings]) -> dict[str, np.ndarray]:
+    """Return {name: (G,) bool} of the selections of guides at the centers of locks; a missing one is left out."""
+    names = set(filter(None, map(clump.guide_set, styles)))
+    found = {name: None if guide_curves is None else selection_sets.read_guides(guide_curves, name) for name in names}
+    return {name: are_chosen for name, are_chosen in found.items() if are_chosen is not None}
 
 
 def _matrix_of(name, label):

@@ -6,6 +6,7 @@ from bpy.types import Curves
 from ....core.errors import HairError
 from ...data.strands import curves, selection_sets
 from ...host.notices import name_of
+from ...settings import marks, style_items
 
 _MOST_BYTES = 40  # of a name, as Blender limits the names of attributes
 
@@ -21,6 +22,7 @@ def save(guides: Curves, name: str) -> int:
     if selected is None:
         raise HairError("Select guides, or points of guides, in Sculpt Mode or Edit Mode first.")
     selection_sets.write(guides, name, selected)
+    _mark_locks(guides, name)
     return int(selected.sum())
 
 
@@ -46,6 +48,14 @@ def remove(guides: Curves, name: str) -> None:
     _require_editable(guides)
     _points_of(guides, name)
     selection_sets.remove(guides, name)
+    _mark_locks(guides, name)
+
+
+def _mark_locks(guides, name):
+    """Mark hair that has the centers of its locks at the guides of a set."""
+    for hair in curves.followers(guides):
+        if name in style_items.center_guides_of(hair.vellus) and hair.is_editable:
+            marks.mark_geometry(hair.vellus, None)
 
 
 def _points_of(guides, name):

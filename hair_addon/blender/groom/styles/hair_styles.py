@@ -18,10 +18,10 @@ from ....core.grooming import groom_defaults
 from ....core.grooming.groom import GuideSettings, HairSettings
 from ....core.long_work import Work
 from ....core.params import declared
-from ....core.styling import curl, fitting, program
+from ....core.styling import curl, fitting, program, varied_numbers
 from ....core.styling.base import StyleSettings, has_effect
 from ...data import scene
-from ...data.strands import curves
+from ...data.strands import curves, style_inputs
 from ...host.datablocks import Remembered
 from ...settings import setting_properties, style_items
 from .. import bindings, pipeline
@@ -122,14 +122,25 @@ def _placing_locks(hair, styles):
 
     Without Auto Update the next update places them.
     """
-    trees = [tree for tree, _level in program.tree_levels([setting_properties.as_stored(style) for style in styles])]
-    bound = bindings.of(hair) if trees and hair.vellus.is_live else None
+    stored = [setting_properties.as_stored(style) for style in styles]
+    bound = bindings.of(hair) if program.tree_levels(stored) and hair.vellus.is_live else None
+    trees = [] if bound is None else _trees_of(hair, bound, stored)
 
     def compute(progress):
         if bound is not None:
             bound.styles.trees.search(trees, progress)
 
     return compute
+
+
+def _trees_of(hair, bound, styles):
+    """Return the clump trees of styles, none if the hair cannot have them: its status gives the reason."""
+    try:
+        guide_sets = style_inputs.guide_sets(hair.vellus.guide_curves, styles)
+        at_guides = varied_numbers.trees_at_guides(styles, guide_sets, len(bound.guides))
+    except HairError:
+        return []
+    return [tree for tree, _level in program.tree_levels(styles, at_guides)]
 
 
 def surface_fit(hair: Curves) -> tuple[float, float]:

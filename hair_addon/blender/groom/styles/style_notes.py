@@ -13,7 +13,7 @@ from bpy.types import Curves, PropertyGroup
 from ....core.styling import clump_trees, fitting, program
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
-from ...data.strands import curves
+from ...data.strands import curves, selection_sets
 from ...host.notices import text_of
 from ...settings import style_items
 from ...settings.translations import interface_text
@@ -72,6 +72,10 @@ def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
         yield interface_text("Pick an object to lean along.")
     if mask and not _has_mask(hair, mask):
         yield interface_text('No vertex group or attribute "{name}".', name=mask)
+    selection = text_of(group, "center_guides") if item.kind == "CLUMP" and group.centers == "GUIDES" else ""
+    guides = hair.vellus.guide_curves
+    if selection and guides is not None and not selection_sets.has(guides, selection):
+        yield interface_text('No selection "{name}": pick another.', name=selection)
     if image and image not in bpy.data.images:
         yield interface_text('No image "{name}": pick another.', name=image)
 
@@ -93,12 +97,17 @@ def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     if tree is None:
         return
     # A map of the size gives a style several trees.
-    used = next((known for known, _level in styling.tree_levels if replace(known, variants=()) == tree), tree)
+    used = next((known for known, _level in styling.tree_levels if _has_settings(known, tree)), tree)
     finest = min(used.variants or (tree,), key=lambda each: min(each.sizes))
     factor = clump_trees.size_factor(styling.trees.area, finest)
     if factor > 1.0:
         size = _shown(factor * finest.sizes[0])
         yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
+
+
+def _has_settings(known, tree):
+    """Whether a clump tree has the settings of a style's tree."""
+    return replace(known, variants=(), guides=None) == tree
 
 
 def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:

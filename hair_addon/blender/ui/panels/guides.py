@@ -6,11 +6,11 @@ import bpy
 from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings
 from ...data.scene import triangle_count
-from ...data.strands import selection_sets
 from ...data.strands.curves import is_hand_made
 from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.guides import guide_states
 from ...groom.selection import guides_of, guides_to_regenerate, surface_of
+from ...settings import selection_names
 from ...settings.translations import interface_text
 from .. import menus, setting_rows, tools
 from .tab import HairTab, draw_work, split, write, write_stale, write_status
@@ -161,7 +161,7 @@ class VELLUS_PT_guides_selections(_OfAnyGuides, bpy.types.Panel):
     def draw(self, context):
         self.layout.operator("vellus.save_selection", icon="ADD")
         column = self.layout.column(align=True)
-        for name in selection_sets.names(guides_of(context.object)):
+        for name in selection_names.names_of(guides_of(context.object)):
             row = column.row(align=True)
             row.operator("vellus.select_saved", text=name, icon="RESTRICT_SELECT_OFF", translate=False).name = name
             row.operator("vellus.remove_selection", text="", icon="X").name = name
