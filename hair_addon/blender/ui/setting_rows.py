@@ -222,11 +222,12 @@ def style_rows(layout, item):
 
 
 def _center_rows(layout, owner, settings_class, style):
-    """Centers of locks; the size is gray if no level has it."""
+    """Centers of locks; a selection is gray without guides, and the size if no level has it."""
     rows(layout, owner, settings_class, ("centers",))
     is_at_guides = owner.centers == "GUIDES"
-    if is_at_guides:
-        rows(layout, owner, settings_class, ("center_guides",))
+    column = layout.column()
+    column.active = is_at_guides
+    rows(column, owner, settings_class, ("center_guides",))
     column = layout.column()
     column.active = not is_at_guides or owner.levels > 1
     rows(column, owner, settings_class, ("size",), style)

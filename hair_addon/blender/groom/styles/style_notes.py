@@ -113,7 +113,8 @@ def _has_settings(known, tree):
 def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     """Yield a note on locks of a preset that were enlarged because there were few strands."""
     known = style_items.enlarged_of(item)
-    if known is None:
+    is_without_size = item.kind == "CLUMP" and item.clump.centers == "GUIDES" and item.clump.levels == 1
+    if known is None or is_without_size:
         return
     fitting_now = fitting.lock_size_for(*known, hair.vellus.hair.strand_count)
     sizes = dict(zip(("wanted", "size", "fitting"), map(_shown, (*known[:2], fitting_now)), strict=True))
