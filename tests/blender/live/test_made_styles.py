@@ -53,7 +53,12 @@ def written(hair):
 
 
 @pytest.mark.parametrize(
-    "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
+    "styles",
+    [
+        (lean.Settings(amount=0.3),),
+        (clump.Settings(size=0.3, levels=1), curl.Settings()),
+        (clump.Settings(size=0.3, centers="GUIDES"),),
+    ],
 )
 def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
     """A stroke on styled hair computes only leaning guides on the processor, and the written strands equal the shown
