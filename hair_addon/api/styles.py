@@ -16,8 +16,8 @@ from ..core.grooming import following, groom, hair_styles
 from ..core.grooming.groom import HairSettings
 from ..core.long_work import Progress, no_progress, part_of, run_now
 from ..core.params import Param, array_of, declared, described, plain_value
-from ..core.styling import clump, lean, trim
-from ..core.styling.base import StyleSettings
+from ..core.styling import lean, trim
+from ..core.styling.base import StyleSettings, guide_set
 from ..core.styling.kinds import OFFERS, kind_of
 from ..core.styling.masks import Inputs, Mask
 from ..core.styling.program import mask_keys
@@ -150,5 +150,5 @@ def _require_arrays(style):
         isinstance(style, lean.Settings) and style.direction == "OBJECT"
     ):
         raise HairError("Styles can refer to objects only in Blender: clear the object's name.")
-    if clump.guide_set(style):
+    if guide_set(style):
         raise HairError("Guides have selections only in Blender: clear the selection's name.")

@@ -97,7 +97,7 @@ def test_a_missing_selection_is_a_status(locks):
     before = points(locks)
     bpy.ops.vellus.remove_selection(name="Some")
     update()
-    sentence = 'The guides have no selection "Some" for the centers of Clump: pick another.'
+    sentence = 'The guides have no selection "Some" for the centers of locks: pick another.'
     assert locks.data.vellus.status == sentence
     item = locks.data.vellus.styles[0]
     assert style_notes.notes_of(locks.data, item) == ['No selection "Some": pick another.']
@@ -105,7 +105,7 @@ def test_a_missing_selection_is_a_status(locks):
     guides = bpy.data.objects["Guides"].data
     selection_sets.write(guides, "Some", np.zeros(len(guides.points), bool))
     regenerated(locks)
-    assert locks.data.vellus.status == 'The selection "Some" for the centers of Clump has no guides: pick another.'
+    assert locks.data.vellus.status == 'The selection "Some" for the centers of locks has no guides: pick another.'
     save("Some", 4)
     require_locks(locks)
     np.testing.assert_array_equal(points(locks), before)

@@ -152,8 +152,12 @@ def have_masks(state):
 
 def center_guides_of(state):
     """Names of the selections of guides at the centers of a hair's locks."""
-    clumps = (item.clump for item in state.styles if item.kind == "CLUMP" and item.clump.centers == "GUIDES")
-    return {text_of(group, "center_guides") for group in clumps} - {""}
+    return {text_of(group_of(item), "center_guides") for item in state.styles if is_at_guides(item)} - {""}
+
+
+def is_at_guides(item):
+    """Whether a style has the centers of its largest locks at guides."""
+    return getattr(group_of(item), "centers", "") == "GUIDES"
 
 
 def objects_named(state):

@@ -8,7 +8,7 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.maps import varied_settings
 from ...core.params import declared
 from ...core.placement import densities
-from ...core.styling.base import ProfiledSettings, StyleSettings
+from ...core.styling.base import LockSettings, ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
 from ..host.notices import text_of
 from ..settings import fitted_sizes, length_steps, setting_properties, style_items
@@ -209,9 +209,9 @@ def style_rows(layout, item):
     owner, settings_class = style_items.group_of(item), KINDS[item.kind]
     rows(layout, owner, settings_class, ("amount",), text_of(item, "name"))
     shared, name = setting_properties.names_of(StyleSettings), text_of(item, "name")
-    centers = _CENTERS if item.kind == "CLUMP" else ()
+    centers = _CENTERS if issubclass(settings_class, LockSettings) else ()
     if centers:
-        _center_rows(layout, owner, settings_class, name)
+        _center_rows(layout, item, owner, settings_class)
     rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS, centers), name)
     for name in _STYLE_OBJECTS:
         if name in owner.bl_rna.properties:
@@ -221,16 +221,16 @@ def style_rows(layout, item):
     rows(layout, owner, settings_class, others(StyleSettings, ("is_on", "amount"), _MASK), text_of(item, "name"))
 
 
-def _center_rows(layout, owner, settings_class, style):
+def _center_rows(layout, item, owner, settings_class):
     """Centers of locks; a selection is gray without guides, and the size if no level has it."""
     rows(layout, owner, settings_class, ("centers",))
-    is_at_guides = owner.centers == "GUIDES"
+    is_at_guides = style_items.is_at_guides(item)
     column = layout.column()
     column.active = is_at_guides
     rows(column, owner, settings_class, ("center_guides",))
     column = layout.column()
-    column.active = not is_at_guides or owner.levels > 1
-    rows(column, owner, settings_class, ("size",), style)
+    column.active = not is_at_guides or getattr(owner, "levels", 1) > 1
+    rows(column, owner, settings_class, ("size",), text_of(item, "name"))
 
 
 def profile_rows(layout, item):

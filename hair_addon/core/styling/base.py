@@ -80,6 +80,29 @@ class ProfiledSettings(StyleSettings):
     )
 
 
+CENTERS = (
+    ("AUTOMATIC", "Automatic", "At places that are spaced evenly on the surface"),
+    ("GUIDES", "Guides", "At guides"),
+)
+
+
+@dataclass(frozen=True)
+class LockSettings(ProfiledSettings):
+    """A style that gathers strands into locks, whose centers may be chosen guides."""
+
+    centers: str = param("AUTOMATIC", "Where the centers of the largest locks are", choices=CENTERS, is_structural=True)
+    center_guides: str = param(
+        "", "Saved selection of the guides at the centers; if empty, all guides", label="Selection", is_structural=True
+    )
+
+
+def guide_set(settings: StyleSettings) -> str | None:
+    """Return the name of the selection of guides at the centers of a style, "" for all guides; None without."""
+    if not isinstance(settings, LockSettings) or settings.centers != "GUIDES":
+        return None
+    return settings.center_guides
+
+
 @dataclass(frozen=True)
 class Profile:
     """The numbers of a profile, as read by kernels; arrays (S,) if they differ between strands."""

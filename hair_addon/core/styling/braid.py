@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..params import param, param_of
-from .base import Cutter, ProfiledSettings, Step, TreeSettings, step_of
+from .base import Cutter, LockSettings, ProfiledSettings, Step, TreeSettings, step_of
 
 LABEL = "Braid"
 DESCRIPTION = "Braid or twist the strands of a lock"
@@ -33,9 +33,10 @@ PATTERNS = (
 
 
 @dataclass(frozen=True)
-class Settings(ProfiledSettings):
+class Settings(LockSettings):
     """Size of a braid and of its tresses."""
 
+    centers: str = param_of(LockSettings, "centers", description="Where the centers of the braids are")
     pattern: str = param("BRAID", "How tresses weave", choices=PATTERNS)
     size: float = param(
         0.05,

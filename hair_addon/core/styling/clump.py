@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..params import param, param_of
-from .base import Cutter, ProfiledSettings, Step, StyleSettings, TreeSettings, step_of
+from .base import Cutter, LockSettings, ProfiledSettings, Step, TreeSettings, step_of
 
 LABEL = "Clump"
 DESCRIPTION = "Gather strands into locks, and locks into larger ones"
@@ -32,20 +32,11 @@ NEEDS_CENTRE = True
 NUMBERS = ("thickness", "twist", "stray")  # of clump.strand
 COURSES = ("amount", "thickness", "twist")
 
-CENTERS = (
-    ("AUTOMATIC", "Automatic", "At places that are spaced evenly on the surface"),
-    ("GUIDES", "Guides", "At guides"),
-)
-
 
 @dataclass(frozen=True)
-class Settings(ProfiledSettings):
+class Settings(LockSettings):
     """Centers, size and strength of locks."""
 
-    centers: str = param("AUTOMATIC", "Where the centers of the largest locks are", choices=CENTERS, is_structural=True)
-    center_guides: str = param(
-        "", "Saved selection of the guides at the centers; if empty, all guides", label="Selection", is_structural=True
-    )
     size: float = param(
         0.012,
         "Distance between the centers of the largest locks",
@@ -122,13 +113,6 @@ class Settings(ProfiledSettings):
 def sizes(settings: Settings) -> list[float]:
     """Return the distances [m] between the centers of each level's locks, the largest first."""
     return [settings.size * settings.ratio**level for level in range(settings.levels)]
-
-
-def guide_set(settings: StyleSettings) -> str | None:
-    """Return the name of the selection of guides at the centers of a style, "" for all guides; None without."""
-    if not isinstance(settings, Settings) or settings.centers != "GUIDES":
-        return None
-    return settings.center_guides
 
 
 def amounts(settings: Settings) -> list[Any]:

@@ -23,8 +23,8 @@ from ..geometry.mesh import SurfacePoints
 from ..interpolation.hair_binding import HairBinding
 from ..kernels.checks import require_count
 from ..params import declared
-from . import clump, kinds, program
-from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
+from . import kinds, program
+from .base import Cutter, Step, StyleSettings, TreeSettings, guide_set, has_effect
 
 MOST_SIZES = 8
 
@@ -175,7 +175,7 @@ def trees_at_guides(
     """
     found = {}
     for place, settings in enumerate(styles):
-        tree, name = program.tree_settings(settings), clump.guide_set(settings)
+        tree, name = program.tree_settings(settings), guide_set(settings)
         if tree is not None and name is not None and has_effect(settings):
             found[place] = replace(tree, guides=_guides_of(name, guide_sets, guide_count))
     return found
@@ -184,11 +184,11 @@ def trees_at_guides(
 def _guides_of(name, guide_sets, guide_count):
     """Return the rising indices of the guides of a selection, "" for all."""
     if name and name not in guide_sets:
-        raise HairError('The guides have no selection "{name}" for the centers of Clump: pick another.', name=name)
+        raise HairError('The guides have no selection "{name}" for the centers of locks: pick another.', name=name)
     are_chosen = guide_sets[name] if name else np.ones(guide_count, bool)
     require_count("guides", len(are_chosen), guide_count)
     if not are_chosen.any():
-        raise HairError('The selection "{name}" for the centers of Clump has no guides: pick another.', name=name)
+        raise HairError('The selection "{name}" for the centers of locks has no guides: pick another.', name=name)
     return tuple(np.flatnonzero(are_chosen).tolist())
 
 

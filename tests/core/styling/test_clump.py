@@ -257,7 +257,10 @@ def chosen_of(hair, step=5):
     return Inputs(guide_sets={"Some": np.arange(len(hair.guides.roots)) % step == 2})
 
 
-@pytest.mark.parametrize("settings", [AT_GUIDES, replace(AT_GUIDES, center_guides="")])
+@pytest.mark.parametrize(
+    "settings",
+    [AT_GUIDES, replace(AT_GUIDES, center_guides=""), braid.Settings(centers="GUIDES", center_guides="Some")],
+)
 def test_chosen_guides_are_the_centers_of_the_strands_nearest_to_them(hair, settings):
     """Centers are the chosen guides, all without a selection, and strands join the nearest by brute force."""
     inputs, guides = chosen_of(hair), hair.guides.numpy()

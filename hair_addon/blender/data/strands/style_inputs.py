@@ -8,8 +8,8 @@ import numpy as np
 
 from ....core import geometry
 from ....core.errors import HairError
-from ....core.styling import clump, lean, trim
-from ....core.styling.base import Cutter, StyleSettings, has_effect
+from ....core.styling import lean, trim
+from ....core.styling.base import Cutter, StyleSettings, guide_set, has_effect
 from ....core.styling.masks import Inputs, Mask
 from ....core.styling.program import mask_keys
 from ...host.notices import name_of
@@ -39,7 +39,7 @@ def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings],
 
 def guide_sets(guide_curves, styles: Sequence[StyleSettings]) -> dict[str, np.ndarray]:
     """Return {name: (G,) bool} of the selections of guides at the centers of locks; a missing one is left out."""
-    names = set(filter(None, map(clump.guide_set, styles)))
+    names = set(filter(None, map(guide_set, styles)))
     found = {name: None if guide_curves is None else selection_sets.read_guides(guide_curves, name) for name in names}
     return {name: are_chosen for name, are_chosen in found.items() if are_chosen is not None}
 

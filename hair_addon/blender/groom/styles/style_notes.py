@@ -72,7 +72,7 @@ def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
         yield interface_text("Pick an object to lean along.")
     if mask and not _has_mask(hair, mask):
         yield interface_text('No vertex group or attribute "{name}".', name=mask)
-    selection = text_of(group, "center_guides") if item.kind == "CLUMP" and group.centers == "GUIDES" else ""
+    selection = text_of(group, "center_guides") if style_items.is_at_guides(item) else ""
     guides = hair.vellus.guide_curves
     if selection and guides is not None and not selection_sets.has(guides, selection):
         yield interface_text('No selection "{name}": pick another.', name=selection)
@@ -113,7 +113,7 @@ def _has_settings(known, tree):
 def _enlarged(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     """Yield a note on locks of a preset that were enlarged because there were few strands."""
     known = style_items.enlarged_of(item)
-    is_without_size = item.kind == "CLUMP" and item.clump.centers == "GUIDES" and item.clump.levels == 1
+    is_without_size = style_items.is_at_guides(item) and getattr(style_items.group_of(item), "levels", 1) == 1
     if known is None or is_without_size:
         return
     fitting_now = fitting.lock_size_for(*known, hair.vellus.hair.strand_count)
