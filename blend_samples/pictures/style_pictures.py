@@ -22,6 +22,7 @@ import hair_addon
 from blend_samples.pictures import look_pictures
 from blend_samples.sheets import picture_files
 from hair_addon import api
+from hair_addon.blender.data.strands import selection_sets
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual"
 WIDTH, HEIGHT, CAPTION = 160, 200, 24  # pixels of a picture, and of the words above it
@@ -39,6 +40,14 @@ BRAID = api.Braid(size=0.022)
 HANGING = (
     ("trim_factor", "Factor {:g}", (), api.Trim(), "factor", (1.0, 0.75, 0.5)),
     ("trim_random", "Random {:g}", (), api.Trim(to_length=0.13), "random", (0.0, 0.3, 0.8)),
+    (
+        "clump_centers",
+        "{}",
+        (),
+        replace(TIGHT, centers="GUIDES"),
+        "center_guides",
+        ("3 guides", "7 guides", "20 guides"),
+    ),
     ("clump_size", "Size {mm:g} mm", (), CLUMP, "size", (0.007, 0.014, 0.03)),
     ("clump_fine_amount", "Fine {:g}", (), replace(CLUMP, size=0.03, amount=0.6), "fine_amount", (0.0, 0.8, 1.6)),
     ("clump_thickness", "Thickness {:g}", (), replace(TIGHT, size=0.016), "thickness", (0.04, 0.2, 0.5)),
@@ -119,6 +128,7 @@ def _grown(width, depth, height, side, comb):
     guides.data.attributes["position"].data.foreach_get("vector", points.ravel())
     comb(points.reshape(len(guides.data.curves), -1, 3))
     guides.data.attributes["position"].data.foreach_set("vector", points.ravel())
+    _save_selections(guides.data, points.reshape(len(guides.data.curves), -1, 3))
     guides.data.update_tag()
     guides.hide_set(True)
     look_pictures.light()
@@ -128,6 +138,15 @@ def _grown(width, depth, height, side, comb):
     look = hair.vellus.appearance
     look.mode, look.absorption, look.roughness, look.random_color = "energy", (0.12, 0.26, 0.6), 0.3, 0.1
     return hair
+
+
+def _save_selections(guides, points):
+    """Save guides that are spaced evenly from left to right as selections for the centers of locks."""
+    order = np.argsort(points[:, 0, 0])
+    for count in (3, 7, 20):
+        chosen = order[((np.arange(count) + 0.5) * len(order) / count).astype(int)]
+        are_chosen = np.isin(np.arange(len(points)), chosen)
+        selection_sets.write(guides, f"{count} guides", np.repeat(are_chosen, points.shape[1]))
 
 
 def hang(strands):
