@@ -13,7 +13,7 @@ from hair_addon.blender.groom.styles import style_notes
 from hair_addon.core.interpolation import sharp_edges
 from tests.support.commands import load, run_here
 from tests.support.overridden import override, parts
-from tests.support.reading import points
+from tests.support.reading import points, write_points
 
 STYLE = {"centers": "GUIDES", "levels": 1, "crossover": 0.0, "stray": 0.0}
 
@@ -109,6 +109,16 @@ def test_a_missing_selection_is_a_status(locks):
     save("Some", 4)
     require_locks(locks)
     np.testing.assert_array_equal(points(locks), before)
+
+
+def test_a_saved_selection_leaves_edited_strands_alone(locks):
+    write_points(locks, 1.1 * points(locks))
+    update()
+    assert curves.is_combed(locks.data)
+    before, status = points(locks), locks.data.vellus.status
+    save("Some", 6)
+    np.testing.assert_array_equal(points(locks), before)
+    assert locks.data.vellus.status == status
 
 
 def test_undo_and_redo(locks):

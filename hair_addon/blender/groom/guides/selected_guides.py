@@ -54,7 +54,8 @@ def remove(guides: Curves, name: str) -> None:
 def _mark_locks(guides, name):
     """Mark hair that has the centers of its locks at the guides of a set."""
     for hair in curves.followers(guides):
-        if name in style_items.center_guides_of(hair.vellus) and hair.is_editable:
+        is_changing = hair.is_editable and not curves.is_combed(hair)
+        if is_changing and name in style_items.center_guides_of(hair.vellus):
             marks.mark_geometry(hair.vellus, None)
 
 
