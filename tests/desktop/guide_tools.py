@@ -14,7 +14,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop import grooms  # noqa: E402
-from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     addon,
     curve_points,
@@ -48,7 +48,8 @@ TOOLS = {
 # In the order of the menu. Gather asks for a curve, and no guide is inside the sphere for Push Outside.
 MENU = (*list(TOOLS)[:6], "push_outside", "draw_tie", "gather_guides", *list(TOOLS)[6:])
 
-facts |= {"tools": {}, "tubes": {}, "shelf": {}, "brush": {}, "tie": {}}
+for step in ("tools", "tubes", "shelf", "brush", "tie"):
+    facts.setdefault(step, {})
 
 
 def guides():
@@ -306,5 +307,9 @@ def tie():
     done["is undone"] = bool(np.array_equal(guides(), before))
 
 
+PARTS = {"tools": (groom, tools, comb_straight), "drawn": (groom, paint_flow, made_of_it, tie)}
+PARTS["all"] = (groom, tools, comb_straight, paint_flow, made_of_it, tie)
+
+
 if __name__ == "__main__":
-    take((groom, tools, comb_straight, paint_flow, made_of_it, tie), pause=0.02)
+    take(PARTS[PART], pause=0.02)

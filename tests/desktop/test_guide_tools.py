@@ -16,10 +16,14 @@ TOOLS = (
 )
 
 
+PARTS = {"opengl": ("all",), "vulkan": ("tools", "drawn")}
+
+
 @pytest.fixture(scope="module", params=walks.LONG_WITH_VULKAN)
 def walk(request, desktop, extension, new_profile):
     """Return the `Walk` with one backend."""
-    return walks.take(desktop, "guide_tools", extension, new_profile(), request.param, size=(760, 540))
+    parts = PARTS[request.param]
+    return walks.take(desktop, "guide_tools", extension, new_profile(), request.param, parts=parts, size=(760, 540))
 
 
 def test_it_comes_to_its_end(walk):
