@@ -151,4 +151,4 @@ def _require_arrays(style):
     ):
         raise HairError("Styles can refer to objects only in Blender: clear the object's name.")
     if guide_set(style):
-        raise HairError("Guides have selections only in Blender: clear the selection's name.")
+        raise HairError("Selections of guides exist only in Blender: clear the name of the selection.")

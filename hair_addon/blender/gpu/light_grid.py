@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands as a 3D texture of voxels and nodes of strands: `core.shading.light_paths`."""
+"""Light among strands as a 3D texture of voxels and sample points along strands: `core.shading.light_paths`."""
 
 import gpu
 import numpy as np

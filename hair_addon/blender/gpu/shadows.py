@@ -135,9 +135,9 @@ class ShadowMaps:
             self._draw_strips(layer, placed, light_block, hidden)
 
     def _are_strands_new(self, layer, view, lights, placed):
-        """Whether a layer has other strands than `placed`, or another light; it has these from now on.
+        """Whether the strands or the light of a layer differ from those of its last call, which are replaced.
 
-        Most maps stay while one of many lights moves. Changed strands are another `StrandsOnGPU`.
+        Most maps stay while one of many lights moves. Changed strands have a new `StrandsOnGPU`.
         """
         light, strands = lights["light"][int(view["light_index"])], [one for one, _records in placed]
         drawn_with = view.tobytes(), light.tobytes(), *(records.tobytes() for _one, records in placed)

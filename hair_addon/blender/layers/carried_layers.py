@@ -96,11 +96,11 @@ def replace_last(guides: Curves, before: LayersBefore, parts: Sequence[GuideLaye
 def binding_of(
     surface: Surface, before: LayersBefore, roots: SurfacePoints, guides: Strands | None = None
 ) -> HairBinding:
-    """Return the `HairBinding` at `roots` to guides, as of strands; guides: None for those before."""
+    """Return the `HairBinding` of `roots` to guides, as for strands; guides: None for the former guides."""
     own = strands.from_numpy(before.guides.numpy(), before.guides.roots, "cpu") if guides is None else guides
     regions = before.parting.regions
     if guides is not None:
-        regions = tuple(region for region in regions if region.guides is None)  # numbers of the guides before
+        regions = tuple(region for region in regions if region.guides is None)  # indices of the former guides
     return groom.bind_hair(
         surface.mesh,
         own,

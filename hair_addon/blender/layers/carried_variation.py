@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random variation of guides with layers, which stays where it is on the surface when their number changes.
+"""Random variation of guides with layers, which stays in place on the surface when the number of guides changes.
 
-Growth draws random lengths and tilts by the index of a guide. With another number of guides, these would be new ones:
-hair would change although its combing has not. So guides remember the roots of the guides whose variation they have.
+Growth draws random lengths and tilts by the index of a guide. With another number of guides, all would be new,
+and hair would change although its combing did not. So guides remember the roots from which their variation comes.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from . import carried_layers
 from .carried_layers import LayersBefore
 
 _NAME = "vellus_variation"  # custom property of guides: {"seed": int, "roots": flat (G, 3) places in the bounding box}
-_SAME = 1e-4  # distance of the same roots, relative to the surface's extent
+_SAME = 1e-4  # largest distance of roots that count as the same, relative to the surface's extent
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class CarriedVariation:
         return grooming.guide_growth.carried(numbers, weights.indices.numpy(), weights.weights.numpy())
 
     def is_at(self, roots: SurfacePoints) -> bool:
-        """Whether guides at some roots are those that the variation comes from."""
+        """Whether roots are those from which the variation comes."""
         if len(roots) != len(self.roots):
             return False
         apart = _relative(self.surface.mesh, roots) - self.roots

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Menu entries: Add ▸ Curve, File ▸ Import and Export, the menus of objects and curves, also on a right-click.
 
-Blender's panel of Cavity gets a line.
+Also a line in Blender's Cavity panel.
 """
 
 import bpy
@@ -206,7 +206,7 @@ CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_hair_pie, VELLUS_MT_
 
 
 def register():
-    """Extend Blender's menus, and its panel of Cavity."""
+    """Extend Blender's menus and its Cavity panel."""
     for menu, entry in _ENTRIES:
         getattr(bpy.types, menu).append(entry)
 

@@ -222,7 +222,7 @@ def style_rows(layout, item):
 
 
 def _center_rows(layout, item, owner, settings_class):
-    """Centers of locks; a selection is gray without guides, and the size if no level has it."""
+    """Centers of locks. The selection is gray without guides, and the size if no level uses it."""
     rows(layout, owner, settings_class, ("centers",))
     is_at_guides = style_items.is_at_guides(item)
     column = layout.column()

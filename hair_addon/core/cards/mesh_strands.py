@@ -32,9 +32,9 @@ _REACH = 0.25  # distance of a root to the surface, relative to the strand's len
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _INWARD = 0.2  # mean cosine between normals and the directions from the center, below which normals point inward
 _ROWS = 64  # rows in which a card's texture is sampled
-_CELLS, _FEWEST, _MOST = 2, 32, 256  # cells of a row for each strand, and the least and largest number
+_CELLS, _FEWEST, _MOST = 2, 32, 256  # cells per strand in a row, and the smallest and largest number of cells
 _BATCH = 1 << 15  # largest number of cells in a row of the cards that are followed together
-_STEEP = 1.0  # cells that the border of an opaque part moves aside relative to the distance of rows, at 45 degrees
+_STEEP = 1.0  # sideways movement of the border of an opaque part, relative to the distance of rows: 45 degrees
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
 _MOST_FACES = 20_000  # of a piece: larger pieces beside smaller pieces are bodies
 _MOST_SCULPTED = 500_000  # of a piece, if all pieces are larger than `_MOST_FACES`; takes ten seconds
@@ -377,7 +377,7 @@ def _along(chart, widths, paths, is_own):
         return _Lines.none()
     inner = _between(chart.stations)
     along = np.clip(inner, first[:, None], last[:, None])
-    # Stations outside of a strand are at its ends, once.
+    # Stations beyond an end of a strand are replaced by this end, once.
     keeps = np.ones(along.shape, bool)
     keeps[:, 1:-1] = (inner[1:-1] > first[:, None]) & (inner[1:-1] < last[:, None])
     rows = along * _ROWS - 0.5

@@ -25,8 +25,8 @@ from ..interpolation.part_lines import PartLines
 
 _PIECES = 64  # resolution of lines: pieces per square root of the surface's area
 _DECIDED = 0.5  # length of the mean direction (1 where lines agree) above which guides turn completely
-_DETOUR = 0.5  # detour around a part line, as a fraction of the distance to the nearest line, without weight
-_FEW = 0.25  # part of the weight of all lines below which lines behind part lines lose their effect
+_DETOUR = 0.5  # detour around a part line that has no weight, relative to the distance to the nearest line
+_FEW = 0.25  # part of the weight that part lines must leave to flow lines; with less, their effect fades
 _ROOM = 1 << 20  # distances in a batch
 
 
@@ -124,7 +124,7 @@ def _mean_directions(lines, places, upward):
 
 
 def _detours(lines, places, upward):
-    """Return (G, N) [m]: how much longer paths from places (G, 3) with normals to pieces are than without part lines.
+    """Return (G, N) [m]: how much part lines lengthen the paths from places (G, 3) with normals to pieces.
 
     Infinite without a path.
     """
@@ -132,7 +132,7 @@ def _detours(lines, places, upward):
     device = parting.points.device
     straight = np.linalg.norm(places[:, None] - middles, axis=2).astype(np.float32)
     order = np.argsort(straight, axis=1, kind="stable")
-    # Without any path, `go_around` leaves the first candidate where it is: it stands twice.
+    # Without any path, `go_around` does not change the first candidate, so this candidate is repeated.
     order = np.concatenate([order[:, :1], order], axis=1).astype(np.int32)
     found, ways = wp.array(order, device=device), wp.array(np.take_along_axis(straight, order, axis=1), device=device)
     roots, root_normals, there, facing = (

@@ -50,7 +50,7 @@ def convert_box(
     has_alpha: bool,
     is_premultiplied: bool,
 ) -> None:
-    """Convert the texels of a box of (H, W, C) float32 pixels in `found`, an array of `colors` or `masks`.
+    """Convert a box of (H, W, C) float32 pixels into texels of `found`, an array of `colors` or `masks`.
 
     Sides of at most `MOST_SIDE`; box: slices of rows and columns.
     """

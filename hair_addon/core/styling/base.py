@@ -81,8 +81,8 @@ class ProfiledSettings(StyleSettings):
 
 
 CENTERS = (
-    ("AUTOMATIC", "Automatic", "At places that are spaced evenly on the surface"),
-    ("GUIDES", "Guides", "At guides"),
+    ("AUTOMATIC", "Automatic", "Space the centers evenly on the surface"),
+    ("GUIDES", "Guides", "Place the centers at chosen guides"),
 )
 
 
@@ -90,7 +90,9 @@ CENTERS = (
 class LockSettings(ProfiledSettings):
     """A style that gathers strands into locks, whose centers may be chosen guides."""
 
-    centers: str = param("AUTOMATIC", "Where the centers of the largest locks are", choices=CENTERS, is_structural=True)
+    centers: str = param(
+        "AUTOMATIC", "Positions of the centers of the largest locks", choices=CENTERS, is_structural=True
+    )
     center_guides: str = param(
         "", "Saved selection of the guides at the centers; if empty, all guides", label="Selection", is_structural=True
     )

@@ -36,7 +36,7 @@ PATTERNS = (
 class Settings(LockSettings):
     """Size of a braid and of its tresses."""
 
-    centers: str = param_of(LockSettings, "centers", description="Where the centers of the braids are")
+    centers: str = param_of(LockSettings, "centers", description="Positions of the centers of the braids")
     pattern: str = param("BRAID", "How tresses weave", choices=PATTERNS)
     size: float = param(
         0.05,

@@ -6,8 +6,8 @@
 Prints the error of means of 12 × 12 pixels in display levels of 255, the structural similarity, the ratio of mean
 colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS[:SEED]: factors of the number of paths, the weight of
 larger voxels in paths (0: by the number of paths), a factor of the number of voxels, and the random seed of the paths;
-"live" is the light of a viewport after one second at rest, "voxels" the same without nodes of strands. Cycles' pictures
-are the means of two halves, whose difference is its own noise.
+"live" is the light of a viewport after one second at rest, "voxels" the same without sample points along strands.
+Cycles' pictures are the means of two halves, whose difference is its own noise.
 
 With --references, many processes share Cycles' work: some with --references-only, each on one thread, render halves
 that no other process has begun, and one process draws all scenes meanwhile, then compares them with the halves.

@@ -170,7 +170,7 @@ class Window:
         self.wait()
 
     def draw_vellus(self):
-        """Draw hair over it, from what has changed to the picture, as the add-on does in a window."""
+        """Draw hair over Blender's picture, with all updates, as the add-on does in a window."""
         with bpy.context.temp_override(**self._where):
             bpy.context.region_data.view_matrix = Matrix(self._to_view.tolist())
             drawn = viewport.drawn_scene_of(bpy.context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Programs read the light of voxels and of nodes of strands from one texture."""
+"""Programs read the light of voxels and of sample points along strands from one texture."""
 
 import numpy as np
 import pytest

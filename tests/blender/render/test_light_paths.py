@@ -100,7 +100,7 @@ def test_strands_far_from_each_other_are_as_with_dual_scattering(scene, monkeypa
 
 
 def test_strands_have_the_light_of_their_own_nodes(scene, monkeypatch):
-    """Each strand has the light of its own nodes, from root to tip."""
+    """Each strand has the light of its own sample points, from root to tip."""
     x = np.linspace(-0.6, 0.6, 5)
     hair_of(scene, np.stack([x, 0.0 * x, 0.0 * x], axis=-1), BROWN, radius=0.03)
     light(scene, sun=3.0)

@@ -2,7 +2,7 @@
 """Files that renders of a scene read, and which of them are missing or damaged: linked libraries, images, IES profiles,
 mesh caches, volumes.
 
-Blender renders without such files, black or otherwise wrong, and reports success.
+Without such files, Blender renders black or otherwise wrong pictures, and reports success.
 """
 
 import hashlib
@@ -181,7 +181,7 @@ def _image_files(image, users, numbers):
         timed = [user for user in users if hasattr(user, "frame_duration")]
         needed = sorted({_image_number(user, number) for user in timed for number in numbers})
         paths = tuple(_numbered(path, number) for number in needed) or (path,)
-        # Of many frames, files are only counted: each is read before its frame.
+        # For many frames, files are only counted. Each file is read before its frame.
         kind = IMAGE if len(numbers) == 1 else ""
         yield RenderedFile(image.filepath, paths, kind, siblings=_row_of(path))
     else:

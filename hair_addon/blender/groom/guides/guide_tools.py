@@ -223,7 +223,7 @@ class ShapesOfStroke:
     """Shapes of guides while a stroke changes them event by event: only new shapes are compared and converted."""
 
     def __init__(self, guides: CombedGuides) -> None:
-        """guides: before the stroke, in whose memory nothing changes."""
+        """guides: as before the stroke; their arrays do not change."""
         self._guides = guides
         self._local = guides.local.copy()
         self._are_frozen = frozen_points.read(guides.datablock)
@@ -244,7 +244,7 @@ class ShapesOfStroke:
             if self._are_frozen is not None:
                 is_other &= ~self._are_frozen[places][..., None]
             if self._are_frozen is not None or after is not shape:
-                # Points that stay keep their bits.
+                # Unchanged points keep their bits.
                 after = np.where(is_other.any(axis=2)[..., None], after, guides.taken(guides.local, chosen, places))
             self._has_moved[chosen] = is_other.reshape(len(chosen), -1).any(axis=1)
             if guides.is_even:

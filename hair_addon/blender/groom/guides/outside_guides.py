@@ -23,7 +23,7 @@ from .guide_tools import CombedGuides
 
 _HEAD = 0.25  # [m] extent that surfaces are scaled to
 _SKIN = 5e-5  # [m] distance of guides from a surface of this extent
-_GRID_POINTS = 3_200_000  # the grid of distances is as fine as for so many points, because it serves many events
+_GRID_POINTS = 3_200_000  # the grid of distances is as fine as for this number of points, as it serves many events
 
 # session_uid of guide Curves → `_Barrier` of their surface in its present pose.
 barrier_cache = Cache(capacity=8)

@@ -152,7 +152,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 self.report({"WARNING"}, error_text(note))
 
     def _check_files(self, blender_scene):
-        """Refuse to render without files in the background. In a window, name the files. Raises `HairError`."""
+        """Raise `HairError` if files are missing or damaged, in the background; in a window, show a warning."""
         wanted = blender_scene.original, [scene_time.frame_of(blender_scene)]
         if bpy.app.background:
             rendered_files.require(*wanted)

@@ -318,7 +318,7 @@ class LiveLight:
         self._followed = None  # (`_Content`, camera) of the sums, likewise the thread's
         self._known = None  # (`_Content`, part) of the textures
         self._grid, self._textures, self._scene = None, (), (None, None)
-        self._texels, self._of_voxels = (), ()  # of the textures; textures without nodes of strands
+        self._texels, self._of_voxels = (), ()  # of the textures; textures of voxels alone
         self._means = self._turned = None  # of the present textures; of the textures when the view turned
         self._acted, self._tried, self._goal, self._seed = -np.inf, 0, 0, 0
         self._faded = 0.0  # part of the weight of former paths that the last turn of the view removed
@@ -532,7 +532,7 @@ class LiveLight:
         return found
 
     def _textures_of(self, hair):
-        """Return the textures for hair. Nodes of strands do not apply to another number of strands."""
+        """Return the textures for hair: those of voxels alone if the number of strands has changed."""
         pairs = zip(hair, self._known[0].hair, strict=True)
         if all(now[0].strand_count == then[0].strand_count for now, then in pairs):
             return self._textures

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands all of whose points are outside for certain, told without a search: eight points at once on a CPU."""
+"""Strands whose points are all outside for certain, found without a search, eight points at a time on a CPU."""
 
 import warp as wp
 
@@ -9,7 +9,7 @@ from .distance_grid import DistanceGrid
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
-# Whether no point of a strand needs a search: 1 or 0; known: of `outside._keep_outside`.
+# Returns 1 if no point of a strand needs a search, otherwise 0; known: as in `outside._keep_outside`.
 @wp.func_native(native_code.body(__file__, "free_points.cpp", WIDTH=8))
 def is_free(
     strand: int,

@@ -5,7 +5,7 @@ Each path measures the light that its strand scatters to the viewer, after any n
 gathered: the light that the same strands would scatter in uniform light, and their light as drawn without paths: dual
 scattering, with sharp shadows. From these three sums `voxel_means` computes how each strand of a voxel is shaded, so
 that the mean light of the voxel is that of the paths. The light that lamps cast at once on the first strand is also
-summed by places along strands, as it differs between neighboring strands: `strand_nodes`.
+summed at sample points along strands, because it differs between neighboring strands: `strand_nodes`.
 """
 
 import math

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of voxels and of nodes of strands in one array of texels: shaders/light/light_grid.glsl reads both from one
-texture, as some graphics drivers have few textures.
+"""Light of voxels and of nodes, the sample points along strands, in one array of texels.
+
+shaders/light/light_grid.glsl reads both from one texture, because some graphics drivers allow few textures.
 
 Layers of voxels come first. Each row of the layers of nodes contains the nodes of whole strands, one after the other.
 The last texel contains the number of nodes per strand.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths by nodes, which are places along strands, for light that differs between the strands of a voxel.
+"""Sums over paths by nodes, which are sample points along strands, for light that differs between strands of a voxel.
 
-Nodes contain the light that lamps cast on a strand at once: shadows and highlights of single strands. At a place this
-light has little noise. Later light has more noise and varies less from strand to strand, so it comes from voxels. So
-does the light of an even world, which no ray to a lamp finds at once.
+Nodes store the light that lamps cast on a strand at once, with the shadows and highlights of single strands. This light
+has little noise. Later light has more noise and varies less from strand to strand, so it comes from voxels. The light
+of an even world also comes from voxels, because rays to lamps do not find it.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ CHANNELS = 18  # RGB of light at once, later light, light of an even world; each
 _PRIOR = 6.0  # weight of the light of voxels, in paths
 _MOST_NODES = 262_144  # of all hair
 _LEAST_OF_STRAND, _MOST_OF_STRAND = 4, 64
-_LONGEST = 2.0  # length of strands between nodes [voxels]: light of voxels also varies along a strand
-_SAMPLED = 1000  # strands that are measured
+_LONGEST = 2.0  # largest distance of nodes along a strand [voxels]: light of voxels varies along it too
+_SAMPLED = 1000  # number of strands whose length is measured
 
 rgb = wp.types.vector(length=3, dtype=wp.float64)
 
@@ -192,12 +192,12 @@ class NodeSums:
 
 
 def _nodes_of(grid, of, most):
-    """Return the number of nodes per strand of `_Strands` if there may be `most`; 0 if they would be sparse."""
+    """Return the number of nodes per strand of `_Strands`, at most `most` in all; 0 if nodes would be sparse."""
     width = int(light_texels.sides_of(grid.shape)[0])
     count = min(most // of.strand_count, _MOST_OF_STRAND, width)
     if count < _LEAST_OF_STRAND:
         return 0
-    count = width // -(-width // count)  # whole strands fill rows of texels
+    count = width // -(-width // count)  # rows of texels hold whole strands
     points = grid.points[of.first_point : of.first_point + of.strand_count * of.point_count]
     some = points.reshape((of.strand_count, of.point_count))[:: -(-of.strand_count // _SAMPLED)].numpy()
     length = np.linalg.norm(np.diff(some, axis=1), axis=-1).sum(axis=1).mean()

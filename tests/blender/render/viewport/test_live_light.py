@@ -225,9 +225,7 @@ def test_the_light_of_a_pattern_that_turns_is_forgotten(view, monkeypatch):
 
 
 def test_light_moves_with_its_hair(view):
-    """Light moves with its hair. Nodes belong to strands by their numbers, so after a change of Strand Count only the
-    light of voxels is shown.
-    """
+    """Light moves with its hair. After a change of Strand Count, only the light of voxels is shown."""
     camera, read = view
     live = live_light.LiveLight()
     before = at_rest(live, read(), camera)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Nodes of strands keep the difference between neighboring strands, and the mean of paths' light."""
+"""Sample points along strands keep the difference between neighboring strands, and the mean of paths' light."""
 
 from dataclasses import replace
 
@@ -92,7 +92,7 @@ def test_strands_of_a_voxel_keep_their_light(rng):
 
 
 def test_light_of_an_even_world_stays_in_voxels(rng):
-    """Without lamps nodes leave all light to voxels: two parts of it with separate noise would differ by more."""
+    """Without lamps, all light comes from voxels: two parts of it with separate noise would differ by more."""
     grid = grid_of(strands_in_a_box(rng, 200), WHITE, voxel_count=300)
     light = surroundings(world=0.7)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 2000)
