@@ -39,7 +39,7 @@ class MeshStrandSettings(Settings):
     )
     uses_alpha: bool = param(
         True,
-        "Run strands along the opaque parts of the texture, and end them where it is transparent",
+        "Let strands follow the opaque parts of the texture, and end where it is transparent",
         label="Use Alpha",
     )
     seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)

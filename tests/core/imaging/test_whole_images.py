@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Image files that end early are told from whole ones."""
+"""Image files that end early are distinguished from complete files."""
 
 import struct
 import zlib
