@@ -90,7 +90,7 @@ def distributing_guides(
 
     grown = yield compute
     guides = writing.write_guides(target.find(), place.find(), surface, grown, settings, key, flow.key, sized.fits)
-    carried_variation.write(guides, variation, grown.strands.roots)
+    carried_variation.write(guides, variation, grown.strands.roots, settings.seed)
     return guides
 
 

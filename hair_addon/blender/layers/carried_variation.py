@@ -19,13 +19,17 @@ from ..data.surfaces import Surface
 from . import carried_layers
 from .carried_layers import LayersBefore
 
-_NAME = "vellus_variation"  # custom property of guides: {"seed": int, "roots": flat (G, 3) places in the bounding box}
+# Custom property of guides: {"seed": int, "roots": flat (G, 3) places in the bounding box, absent for their own roots}.
+_NAME = "vellus_variation"
 _SAME = 1e-4  # largest distance of roots that count as the same, relative to the surface's extent
 
 
 @dataclass(frozen=True)
 class CarriedVariation:
-    """Variation of a seed at roots (G, 3), relative to the bounding box of a surface."""
+    """Variation of a seed at roots (G, 3), relative to the bounding box of a surface in local coordinates.
+
+    These stay where the surface is moved, turned or scaled.
+    """
 
     surface: Surface
     before: LayersBefore
@@ -37,8 +41,8 @@ class CarriedVariation:
         if self.is_at(roots):
             return None
         mesh = self.surface.mesh
-        low, size = _box(mesh)
-        own = geometry.closest_point.SurfaceQuery(mesh).nearest((low + size * self.roots).astype(np.float32))
+        low, size = _box(self.surface)
+        own = geometry.closest_point.SurfaceQuery(mesh).nearest(self.surface.from_local(low + size * self.roots))
         places = np.stack([mesh_math.positions(mesh, own)] * 2, axis=1)
         binding = carried_layers.binding_of(
             self.surface, self.before, roots, strands.from_numpy(places.astype(np.float32), own, "cpu")
@@ -51,7 +55,7 @@ class CarriedVariation:
         """Whether roots are those from which the variation comes."""
         if len(roots) != len(self.roots):
             return False
-        apart = _relative(self.surface.mesh, roots) - self.roots
+        apart = _relative(self.surface, roots) - self.roots
         return bool(np.abs(apart).max(initial=0.0) <= _SAME)
 
 
@@ -63,31 +67,33 @@ def read(guides: Curves | None, surface: Surface, seed: int) -> CarriedVariation
     if before is None:
         return None
     stored = guides.get(_NAME)
-    if stored is None:
-        return CarriedVariation(surface, before, seed, _relative(surface.mesh, before.guides.roots))
     try:
-        stored_seed, roots = stored["seed"], np.array(stored["roots"], np.float64).reshape(-1, 3)
+        if stored is not None and stored["seed"] != seed:
+            return None
+        if stored is None or "roots" not in stored:
+            roots = _relative(surface, before.guides.roots)
+        else:
+            roots = np.array(stored["roots"], np.float64).reshape(-1, 3)
     except (KeyError, TypeError, ValueError, IndexError):  # of a damaged file
         return None
-    if stored_seed != seed or not len(roots) or not np.isfinite(roots).all():
-        return None
-    return CarriedVariation(surface, before, seed, roots)
+    return CarriedVariation(surface, before, seed, roots) if len(roots) and np.isfinite(roots).all() else None
 
 
-def write(guides: Curves, variation: CarriedVariation | None, roots: SurfacePoints) -> None:
-    """Remember where the variation of guides that were grown at `roots` comes from; None for their own."""
+def write(guides: Curves, variation: CarriedVariation | None, roots: SurfacePoints, seed: int) -> None:
+    """Remember the seed of guides that were grown at `roots`, and where their variation comes from; None for there."""
     if variation is not None and not variation.is_at(roots):
-        guides[_NAME] = {"seed": variation.seed, "roots": variation.roots.ravel().tolist()}
-    elif _NAME in guides:
-        del guides[_NAME]
+        guides[_NAME] = {"seed": seed, "roots": variation.roots.ravel().tolist()}
+    else:
+        guides[_NAME] = {"seed": seed}
 
 
-def _relative(mesh, roots):
-    low, size = _box(mesh)
-    return (mesh_math.positions(mesh, roots) - low) / size
+def _relative(surface, roots):
+    low, size = _box(surface)
+    return (surface.to_local(mesh_math.positions(surface.mesh, roots)[:, None])[:, 0] - low) / size
 
 
-def _box(mesh):
-    """Return the lowest corner (3,) and the largest side [m] of a mesh's bounding box."""
-    low = mesh.vertices.min(axis=0).astype(np.float64)
-    return low, float((mesh.vertices.max(axis=0) - low).max())
+def _box(surface):
+    """Return the lowest corner (3,) and the largest side of a surface's bounding box, in local coordinates."""
+    vertices = surface.local_mesh.vertices
+    low = vertices.min(axis=0).astype(np.float64)
+    return low, float((vertices.max(axis=0) - low).max())

@@ -296,3 +296,42 @@ def test_random_variation_of_layered_guides_stays_on_the_surface(hair, mirror):
     settings.seed -= 1
     update()
     np.testing.assert_allclose(points(guides), plain, atol=1e-5)
+
+
+@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
+def test_random_variation_of_layered_guides_stays_on_a_turned_surface(hair, scale):
+    """With as many guides as before, on a surface that was turned and scaled, each has its own length."""
+    guides = bpy.data.objects["Guides"]
+    settings = guides.data.vellus.guides
+    settings.guide_count, settings.length_variation, settings.gravity = 120, 0.5, 0.0
+    update()
+
+    def sizes():
+        found = lengths(points(guides))
+        return found / found.mean()
+
+    plain = sizes()
+    api.add_layer(guides)
+    settings.guide_count = 240
+    update()
+    guides.data.surface.matrix_world = Matrix.Rotation(2.0, 4, (1.0, 0.5, 0.3)) @ Matrix.Scale(scale, 4)
+    settings.guide_count = 120
+    update()
+    np.testing.assert_allclose(sizes(), plain, rtol=1e-3)
+
+
+def test_another_seed_gives_layered_guides_its_own_variation(hair):
+    """After each change of the seed, layers without combing leave guides as they grow without layers."""
+    guides = bpy.data.objects["Guides"]
+    settings = guides.data.vellus.guides
+    settings.length_variation, settings.gravity = 0.5, 0.0
+    grown = {}
+    for seed in (6, 7, 5):
+        settings.seed = seed
+        update()
+        grown[seed] = points(guides)
+    api.add_layer(guides)
+    for seed in (6, 7, 5):
+        settings.seed = seed
+        update()
+        np.testing.assert_allclose(points(guides), grown[seed], atol=1e-5)
