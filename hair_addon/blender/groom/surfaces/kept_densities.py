@@ -28,13 +28,14 @@ def toggle(target: Curves, depsgraph: Depsgraph) -> None:
 def have_other_number(target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether guides or hair keep a density that now gives another number, and may be generated again.
 
-    Raises `HairError` if the surface or its mask cannot be read.
+    Guides and hair with a status count, as an earlier density may have given a number that was refused. Raises
+    `HairError` if the surface or its mask cannot be read.
     """
     if not _may_change(target):
         return False
     settings_class = GuideSettings if target.vellus.kind == "GUIDES" else HairSettings
     settings = setting_properties.to_settings(_settings(target), settings_class)
-    return densities.counted(settings, _area(target, depsgraph)) != settings
+    return bool(target.vellus.status) or densities.counted(settings, _area(target, depsgraph)) != settings
 
 
 def have_other_scale(target: Curves) -> bool:
