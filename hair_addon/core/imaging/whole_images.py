@@ -9,10 +9,12 @@ import zlib
 
 _PNG, _JPEG, _TIFF = b"\x89PNG\r\n\x1a\n", b"\xff\xd8", (b"II*\0", b"MM\0*")
 
+_SCAN = 0xDA  # marker of a JPEG file
 # Tags of a TIFF file: offsets and byte counts of its strips, and of its tiles. Types of their values → bytes.
 _PARTS = (273, 279), (324, 325)
 _BYTES = {3: 2, 4: 4}
 _HEAD_OF_IES = 13  # numbers before the angles
+_SPACES_OF_IES = bytes.maketrans(b",\x1a\0", b"   ")  # commas, and what old programs write at the end
 
 
 def has_structure(head: bytes) -> bool:
@@ -38,12 +40,15 @@ def is_whole_ies(data: bytes) -> bool:
     tilt, _line, numbers = rest.partition(b"\n")
     if not found or tilt.strip() != b"NONE":
         return bool(found and numbers.strip())
+    numbers = numbers.translate(_SPACES_OF_IES).split()
     try:
-        values = [float(number) for number in numbers.replace(b",", b" ").split()]
-        vertical, horizontal = int(values[3]), int(values[4])
-    except (ValueError, IndexError, OverflowError):
+        vertical, horizontal = (int(float(number)) for number in numbers[3:5])
+        count = _HEAD_OF_IES + vertical + horizontal + vertical * horizontal
+        # Text may follow the values.
+        values = [float(number) for number in numbers[: max(count, 0)]]
+    except (ValueError, OverflowError):
         return False
-    return len(values) >= _HEAD_OF_IES + vertical + horizontal + vertical * horizontal
+    return min(vertical, horizontal) > 0 and len(values) == count
 
 
 def _is_whole_png(data):
@@ -62,12 +67,15 @@ def _is_whole_png(data):
 
 def _is_whole_jpeg(data):
     """Whether the end of the picture follows its first scan: a thumbnail before it has an end too."""
-    place = len(_JPEG)
-    while place + 4 <= len(data) and data[place] == 0xFF:
-        if data[place + 1] == 0xDA:
+    place = data.find(b"\xff", len(_JPEG))
+    while 0 <= place <= len(data) - 4:
+        kind = data[place + 1]
+        if kind == _SCAN:
             return data.find(b"\xff\xd9", place) >= 0
-        is_fill = data[place + 1] == 0xFF
-        place += 1 if is_fill else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+        # Decoders skip bytes between segments.
+        has_length = kind not in (0, 1, 0xFF) and not 0xD0 <= kind <= 0xD9
+        place += 2 + int.from_bytes(data[place + 2 : place + 4], "big") if has_length else 1
+        place = data.find(b"\xff", place)
     return False
 
 

@@ -46,6 +46,15 @@ def test_no_part_of_a_file_is_whole(name):
     assert not any(is_whole(data[:length]) for length in range(4, len(data)))
 
 
+def test_a_jpeg_may_have_bytes_between_its_segments():
+    data = FILES["jpeg"]
+    end = 4 + int.from_bytes(data[4:6], "big")
+    for more in (b"\0", b"\xff\xff", b"\xff\0", b"\xff\x01", bytes(7)):
+        for place in (2, end):
+            found = data[:place] + more + data[place:]
+            assert is_whole(found) and not is_whole(found[:-1])
+
+
 def test_a_flipped_bit_of_a_png_is_found():
     data = bytearray(png())
     data[45] ^= 1
@@ -66,4 +75,7 @@ def test_an_ies_file_has_all_its_values():
     profile = b"IESNA:LM-63-2002\nTILT=NONE\n1 -1 1.0 2 1 1 2 0 0 0\n1.0 1.0 0\n0 90\n0\n1000 5"
     assert is_whole_ies(profile)
     assert not any(is_whole_ies(profile[:length]) for length in range(len(profile) - 1))
-    assert not is_whole_ies(profile.replace(b"2 1 1", b"9 1 1"))
+    for end in (b"\x1a", b"\0", b"\r\n\x1a", b"\nEND OF FILE\n"):  # of programs for DOS, and comments
+        assert is_whole_ies(profile + end) and not is_whole_ies(profile[:-2] + end)
+    for counts in (b"9 1 1", b"-1 -1 1", b"0 9 1", b"nan 1 1", b"1e30 1 1"):
+        assert not is_whole_ies(profile.replace(b"2 1 1", counts))
