@@ -6,6 +6,8 @@ import subprocess
 import sys
 
 import bpy
+import numpy as np
+import OpenEXR
 import pytest
 
 from hair_addon import api
@@ -177,6 +179,20 @@ def test_empty_and_unreadable_files_are_missing(sky, tmp_path):
         assert named() == [str(path)]
     sky.image = new_image(write_image(tmp_path / "sky.exr"))
     assert named() == []
+
+
+def test_files_with_layers_or_parts_are_read(sky, tmp_path):
+    """Decoders of single pictures refuse files with layers, which Blender renders."""
+    path, pixels = tmp_path / "layers.exr", np.ones((8, 8), np.float32)
+    layers = [{f"View Layer.{name}.{color}": pixels for color in "RGB"} for name in ("Combined", "Emission")]
+    parts = [OpenEXR.Part({}, layer, name) for layer, name in zip(layers, "ab", strict=True)]
+    for written in (OpenEXR.File({}, layers[0] | layers[1]), OpenEXR.File(parts)):
+        written.write(str(path))
+        sky.image = new_image(path)
+        whole = path.read_bytes()
+        assert named() == []
+        path.write_bytes(whole[:-1])
+        assert named() == [str(path)]
 
 
 def test_each_tile_and_each_number_is_asked_for(sky, tmp_path):

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether the bytes of an image file are complete, without decoding its pixels.
 
-Sources: PNG (ISO/IEC 15948), JPEG (ITU-T T.81, annex B), TIFF (revision 6.0), IES (ANSI/IESNA LM-63).
+Sources: PNG (ISO/IEC 15948), JPEG (ITU-T T.81, annex B), TIFF (revision 6.0), OpenEXR (file layout 2.0), IES
+(ANSI/IESNA LM-63).
 """
 
 import math
 import zlib
 
-_PNG, _JPEG, _TIFF = b"\x89PNG\r\n\x1a\n", b"\xff\xd8", (b"II*\0", b"MM\0*")
+_PNG, _JPEG, _TIFF, _EXR = b"\x89PNG\r\n\x1a\n", b"\xff\xd8", (b"II*\0", b"MM\0*"), b"\x76\x2f\x31\x01"
 
 _SCAN = 0xDA  # marker of a JPEG file
 # Tags of a TIFF file: offsets and byte counts of its strips, and of its tiles. Types of their values → bytes.
 _PARTS = (273, 279), (324, 325)
 _BYTES = {3: 2, 4: 4}
+# Flags of an OpenEXR file, and of its chunks {whether of tiles: bytes between the part's number and the size}.
+_HAS_TILES, _IS_DEEP, _HAS_PARTS = 0x200, 0x800, 0x1000
+_BEFORE_SIZE = {False: 4, True: 16}
+
 _HEAD_OF_IES = 13  # numbers before the angles
 _SPACES_OF_IES = bytes.maketrans(b",\x1a\0", b"   ")  # commas, and what old programs write at the end
 
 
 def has_structure(head: bytes) -> bool:
     """Whether the first bytes of a file are those of a format that `is_whole` checks."""
-    return head.startswith((_PNG, _JPEG, *_TIFF))
+    return head.startswith((_PNG, _JPEG, *_TIFF, _EXR))
 
 
 def is_whole(data: bytes) -> bool | None:
@@ -31,6 +36,8 @@ def is_whole(data: bytes) -> bool | None:
         return _is_whole_png(data) or None  # readers accept some wrong checksums
     if data.startswith(_JPEG):
         return _is_whole_jpeg(data)
+    if data.startswith(_EXR):
+        return _is_whole_exr(data)
     return _is_whole_tiff(data) if data.startswith(_TIFF) else None
 
 
@@ -77,6 +84,68 @@ def _is_whole_jpeg(data):
         place += 2 + int.from_bytes(data[place + 2 : place + 4], "big") if has_length else 1
         place = data.find(b"\xff", place)
     return False
+
+
+def _is_whole_exr(data):
+    """Whether all chunks of an OpenEXR file with layers or parts are within the data, as decoders of single pictures
+    refuse such files; None for other files.
+    """
+    flags = _little(data, 4, 4)
+    try:
+        parts, place = _parts_of_exr(data, bool(flags & _HAS_PARTS))
+        names = _names_in(parts[0]["channels"])
+    except (ValueError, KeyError, IndexError):
+        return False
+    if flags & _IS_DEEP or not (flags & _HAS_PARTS or any(b"." in name for name in names)):
+        return None
+    first, last = len(data), 0  # chunks; their offsets end where the first chunk begins
+    while place < first:
+        offset = _little(data, place, 8)
+        if not place + 8 <= offset < len(data):
+            return False
+        first, last, place = min(first, offset), max(last, offset), place + 8
+    has_tiles = bool(flags & _HAS_TILES)
+    if flags & _HAS_PARTS:
+        number, last = _little(data, last, 4), last + 4
+        has_tiles = number < len(parts) and parts[number].get("type") == b"tiledimage"
+    size = last + _BEFORE_SIZE[has_tiles]
+    return last > 0 and size + 4 + _little(data, size, 4) <= len(data)
+
+
+def _parts_of_exr(data, has_parts):
+    """Return ([{attribute: value}] of the parts of an OpenEXR file, place after them).
+
+    Raises `ValueError` if the data end before.
+    """
+    parts, place = [{}], 8
+    while True:
+        end = data.index(b"\0", place)
+        name, place = data[place:end].decode("latin-1"), end + 1
+        if name:
+            place = data.index(b"\0", place) + 1  # after the type
+            size = _little(data, place, 4)
+            parts[-1][name] = data[place + 4 : place + 4 + size]
+            place += 4 + size
+        elif not has_parts:
+            return parts, place
+        elif not parts[-1]:
+            return parts[:-1], place
+        else:
+            parts.append({})
+
+
+def _names_in(channels):
+    """Return the names of a list of channels of an OpenEXR file."""
+    names, place = [], 0
+    while channels[place]:
+        end = channels.index(b"\0", place)
+        names.append(channels[place:end])
+        place = end + 17
+    return names
+
+
+def _little(data, place, size):
+    return int.from_bytes(data[place : place + size], "little")
 
 
 def _is_whole_tiff(data):

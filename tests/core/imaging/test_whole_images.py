@@ -36,7 +36,37 @@ def tiff(order):
     return (head + directory).ljust(200, b"\0") + struct.pack(order + "II", 208, 248) + b"".join(strips)
 
 
-FILES = {"png": png(), "jpeg": jpeg(), "tiff": tiff("<"), "tiff, big-endian": tiff(">")}
+def exr(names, flags=0):
+    """Return an OpenEXR file of one line or tile, in as many parts as the flags announce, for channels of one pixel."""
+    channels = b"".join(name + b"\0" + struct.pack("<4i", 2, 0, 1, 1) for name in names) + b"\0"
+    attributes = [(b"channels", b"chlist", channels), (b"tiles", b"tiledesc", struct.pack("<IIB", 1, 1, 0))]
+    part_count = 2 if flags & 0x1000 else 1
+    if part_count == 2:
+        attributes.append((b"type", b"string", b"tiledimage" if flags & 0x200 else b"scanlineimage"))
+    head = b"".join(
+        name + b"\0" + kind + b"\0" + struct.pack("<I", len(value)) + value for name, kind, value in attributes
+    )
+    heads = b"\x76\x2f\x31\x01" + struct.pack("<I", 2 | flags & ~(0x200 if part_count == 2 else 0))
+    heads += (head + b"\0") * part_count + b"\0" * (part_count - 1)
+    pixels, start = bytes(4 * len(names)), len(heads) + 8 * part_count
+    chunks, offsets = b"", b""
+    for part in range(part_count):
+        offsets += struct.pack("<Q", start + len(chunks))
+        chunks += struct.pack("<i", part) * (part_count - 1) + bytes(16 if flags & 0x200 else 4)
+        chunks += struct.pack("<i", len(pixels)) + pixels
+    return heads + offsets + chunks
+
+
+FILES = {
+    "png": png(),
+    "jpeg": jpeg(),
+    "tiff": tiff("<"),
+    "tiff, big-endian": tiff(">"),
+    "exr, layers": exr([b"A.R", b"A.G"]),
+    "exr, tiled layers": exr([b"A.R", b"A.G"], 0x200),
+    "exr, parts": exr([b"R"], 0x1000),
+    "exr, tiled parts": exr([b"R"], 0x1200),
+}
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -68,7 +98,8 @@ def test_huge_numbers_of_a_tiff_are_not_followed():
 
 
 def test_formats_without_an_end_are_left_to_a_decoder():
-    assert is_whole(b"\x76\x2f\x31\x01") is None
+    assert is_whole(b"RIFF") is None
+    assert is_whole(exr([b"B", b"G", b"R"])) is None and is_whole(exr([b"A.R"], 0x800)) is None
 
 
 def test_an_ies_file_has_all_its_values():
