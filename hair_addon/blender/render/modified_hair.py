@@ -47,8 +47,9 @@ def strands_on_gpu(hair_object: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     if known is None:
         read, spare = read_strands.read(evaluated), None
     else:
-        radii = known.arrays[1]
-        spare = np.empty(radii.shape, np.float32) if known.spare is None else known.spare
+        radii, spare = known.arrays[1], known.spare
+        if spare is None or spare.shape != radii.shape:
+            spare = np.empty(radii.shape, np.float32)
         read = read_strands.read(evaluated, radii, spare)
     if known is not None and read_strands.are_same(read.arrays, known.arrays):
         known.is_current, known.spare = True, spare

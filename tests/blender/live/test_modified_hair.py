@@ -71,6 +71,10 @@ def test_modifiers_may_change_the_number_of_strands(modified):
     add_asset(modified, "Duplicate Hair Curves")
     found = is_evaluated(modified)
     assert len(found) > len(modified.data.curves)
+    for turn, is_shown in enumerate((False, False, True)):
+        modified.modifiers[-1].show_viewport = is_shown
+        bend(modified.data.surface, 0.1 * turn)
+        assert (len(is_evaluated(modified)) == len(found)) == is_shown
 
 
 def test_what_blender_did_not_evaluate_again_is_not_uploaded_again(modified, monkeypatch):
