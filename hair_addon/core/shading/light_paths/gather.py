@@ -173,8 +173,9 @@ class PathSums:
     def __init__(self, grid: StrandGrid, surroundings: Surroundings) -> None:
         self.grid, self.taken = grid, 0.0
         self._sums = voxel_sums.VoxelSums(grid)
-        self._parts = voxel_sums.VoxelSums(grid, strand_nodes.CHANNELS)
         self._nodes = strand_nodes.NodeSums(grid)
+        # Parts of light are only for nodes.
+        self._parts = voxel_sums.VoxelSums(grid, strand_nodes.CHANNELS) if len(self._nodes) else None
         self._total = self._squares = 0.0
         self._seen: Seen | None = None
         self._voxel_count = 0  # with visible hair
@@ -222,9 +223,10 @@ class PathSums:
             traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
             positions, light, even, *parts = traced
             self._sums.add(positions, starts.segments, light, even, 0)
-            for index, part in enumerate(parts):
-                self._parts.add(positions, starts.segments, part, even, 6 * index)
-            self._nodes.add(starts.segments, positions, parts[0], even)
+            if self._parts is not None:
+                for index, part in enumerate(parts):
+                    self._parts.add(positions, starts.segments, part, even, 6 * index)
+                self._nodes.add(starts.segments, positions, parts[0], even)
             total, squares = voxel_sums.brightness(light)
         self._total, self._squares, self.taken = self._total + total, self._squares + squares, self.taken + len(light)
 
@@ -254,7 +256,8 @@ class PathSums:
 
     def _fade(self, weight):
         for sums in (self._sums, self._parts, self._nodes):
-            sums.scale(weight)
+            if sums is not None:
+                sums.scale(weight)
         self._total, self._squares, self.taken = weight * self._total, weight * self._squares, weight * self.taken
 
     def of_systems(self) -> list[wp.array4d[wp.float64]]:
@@ -277,7 +280,7 @@ class PathSums:
         count, origin = max(int(taken), 1), self.grid.origin
         prior = voxel_means.prior_of(taken / max(self._voxel_count, 1))
         found = of_each(lambda of_hair: voxel_means.shares(of_hair, count, origin, prior), sums.of_systems())
-        parts, paths = self._parts.of_systems(), max(int(self.taken), 1)
+        parts, paths = [] if self._parts is None else self._parts.of_systems(), max(int(self.taken), 1)
 
         def of_nodes(system):
             if not self._nodes.has(system):

@@ -149,6 +149,9 @@ class NodeSums:
                     first_node += of.strand_count * of.node_count
         self._sums = wp.zeros((first_node, 6), dtype=wp.float64, device=grid.device)
 
+    def __len__(self) -> int:
+        return len(self._sums)
+
     def has(self, system: int) -> bool:
         """Whether a system, by its index, has nodes."""
         return system in self._systems

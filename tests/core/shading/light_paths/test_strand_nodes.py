@@ -146,3 +146,20 @@ def test_linked_long_and_very_many_strands_have_no_nodes(rng, monkeypatch):
     monkeypatch.setattr(strand_nodes, "_MOST_NODES", 4 * 149)
     assert [strand_nodes.NodeSums(grid).has(index) for index in range(2)] == [True, False]
     assert voxel_means.CHANNELS < strand_nodes.CHANNELS
+
+
+def test_hair_without_nodes_has_no_sums_of_parts(rng, monkeypatch):
+    """Sums of parts of light take more memory than all others, so hair without nodes does without them."""
+    grid = grid_of(strands_in_a_box(rng, 200), WHITE, voxel_count=300)
+    light = surroundings(lamps=sun((0.0, 1.0, 0.0)))
+    seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 500)
+    layers = light_texels.sides_of(grid.shape)[2]
+    with_nodes = gather.gather(grid, light, seen, 500)
+    monkeypatch.setattr(strand_nodes, "_MOST_NODES", 0)
+    without = gather.gather(grid, light, seen, 500)
+    without.see(seen, 0.5)
+    with_nodes.see(seen, 0.5)
+    assert with_nodes._parts is not None and without._parts is None
+    (texels,), (others,) = without.texels(), with_nodes.texels()
+    assert len(texels) == layers < len(others)
+    np.testing.assert_array_equal(texels, others[:layers])
