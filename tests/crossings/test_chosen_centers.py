@@ -40,12 +40,16 @@ def save(name, step):
     update()
 
 
+def roots_of(guides):
+    return curves.read_points(guides)[curves.curve_offsets(guides)[:-1]]
+
+
 def require_locks(hair, are_chosen=None):
     """Assert that each strand belongs to the nearest chosen guide, by default to that of the selection "Some"."""
     assert hair.data.vellus.status == ""
     guides = hair.data.vellus.guide_curves
     are_chosen = selection_sets.read_guides(guides, "Some") if are_chosen is None else are_chosen
-    roots = curves.read_points(guides)[curves.curve_offsets(guides)[:-1]][are_chosen]
+    roots = roots_of(guides)[are_chosen]
     bound = bindings.of(hair.data)
     styling = bound.styles.styling
     level = styling.levels[0].binding
@@ -91,6 +95,29 @@ def test_locks_follow_the_selection_and_its_guides(locks):
     locks.data.vellus.styles[0].clump.center_guides = ""
     update()
     require_locks(locks, np.ones(len(guides.curves), bool))
+
+
+@pytest.mark.parametrize("is_layered", [False, True])
+def test_locks_stay_in_place_when_guides_are_generated_again(locks, is_layered):
+    """Each center goes to the nearest new guide, with more, fewer and other guides; other selections to all guides."""
+    guides = bpy.data.objects["Guides"].data
+    save("Some", 9)
+    half = curves.read_points(guides)[:, 0] > 0.0
+    selection_sets.write(
+        guides, "Half", np.repeat(half[curves.curve_offsets(guides)[:-1]], curves.point_counts(guides))
+    )
+    if is_layered:
+        api.add_layer(guides)
+    for setting, value in (("guide_count", 240), ("seed", 9), ("guide_count", 120)):
+        before = roots_of(guides)[selection_sets.read_guides(guides, "Some")]
+        setattr(guides.vellus.guides, setting, value)
+        update()
+        roots, are_chosen = roots_of(guides), selection_sets.read_guides(guides, "Some")
+        apart = np.linalg.norm(roots[:, None] - before, axis=2)
+        np.testing.assert_array_equal(np.unique(apart.argmin(axis=0)), np.flatnonzero(are_chosen))
+        require_locks(locks)
+        is_right = selection_sets.read_guides(guides, "Half") == (roots[:, 0] > 0.0)
+        assert is_right[np.abs(roots[:, 0]) > 0.4].all() and is_right.mean() > 0.85
 
 
 def test_a_missing_selection_is_a_status(locks):

@@ -16,7 +16,7 @@ from ..data.maps import strand_maps
 from ..data.strands import attributes, curves, curves_objects, gathered_groups, kept_shapes, kept_widths, stored_roots
 from ..data.surfaces import Surface, cage_of
 from ..host.notices import name_of
-from ..layers import carried_layers
+from ..layers import carried_layers, carried_selections
 from ..materials import looks
 from ..settings import animated, ramp_nodes, setting_properties, style_items
 from . import bindings, hair_outside, size_fitting, staleness
@@ -50,7 +50,7 @@ def write_guides(
     size_fitting.keep(target, fits)
     target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
-    before = carried_layers.read(target, surface)
+    before, selections = carried_layers.read(target, surface), carried_selections.read(target, surface)
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
@@ -60,6 +60,7 @@ def write_guides(
         gathered_groups.write(target, None)
     else:
         carried_layers.write(target, surface, before, guides.roots)
+    carried_selections.write(target, surface, selections)
     surface_space.keep_surface(target, rooted_on)
     return target
 

@@ -8,6 +8,7 @@ from ...core.lazy import submodules
 if TYPE_CHECKING:
     from . import (
         carried_layers,
+        carried_selections,
         carried_variation,
         recording,
     )
