@@ -170,15 +170,23 @@ def test_only_what_a_render_reads_is_asked_for(sky, tmp_path):
     assert named() == []
 
 
-def test_empty_and_unreadable_files_are_missing(sky, tmp_path):
+def test_empty_and_unreadable_files_are_missing(sky, tmp_path, monkeypatch):
     empty, text = tmp_path / "empty.exr", tmp_path / "text.tga"
     empty.touch()
     text.write_text("no image")
     for path in (empty, text):
         sky.image = new_image(path)
         assert named() == [str(path)]
-    sky.image = new_image(write_image(tmp_path / "sky.exr"))
+    path = write_image(tmp_path / "sky.exr")
+    sky.image = new_image(path)
+    with monkeypatch.context() as patched:
+        patched.setattr(rendered_files.Path, "open", refused)
+        assert named() == [str(path)]
     assert named() == []
+
+
+def refused(path, *_given):
+    raise PermissionError(f"no permission to read {path}")
 
 
 def test_files_with_layers_or_parts_are_read(sky, tmp_path):

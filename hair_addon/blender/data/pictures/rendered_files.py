@@ -258,10 +258,15 @@ def _is_readable_profile(path):
 
 
 def _kept(path, is_readable):
-    """Return is_readable(path), which is called again only if the file has changed."""
+    """Return is_readable(path), which is called again only if the file has changed; false without permission to read
+    the file.
+    """
     status = path.stat()
     key = path, status.st_mtime_ns, status.st_size
-    return readable_cache.get(key, lambda: is_readable(path))
+    try:
+        return readable_cache.get(key, lambda: is_readable(path))
+    except OSError:
+        return False
 
 
 def _can_be_decoded(path):
