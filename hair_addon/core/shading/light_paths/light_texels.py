@@ -11,12 +11,18 @@ import numpy as np
 
 from ...texture_sides import avoid_powers_of_two
 
+MOST_OF_STRAND = 64  # nodes
 _MOST_LAYERS = 2048  # which all graphics drivers allow
+_MOST_WIDENED = 500_000  # texels of a grid that is wider than its voxels
 
 
 def sides_of(shape: tuple[int, int, int]) -> np.ndarray:
-    """Return (3,) texels along X, Y, Z of the voxels of a grid of this shape (X, Y, Z)."""
-    return avoid_powers_of_two(shape)
+    """Return (3,) texels along X, Y, Z of the voxels of a grid of this shape (X, Y, Z).
+
+    Nodes of a strand are in a row along X, so grids of hair that is narrow along X are wider than their voxels.
+    """
+    least = min(MOST_OF_STRAND, _MOST_WIDENED // (shape[1] * shape[2]))
+    return avoid_powers_of_two((max(shape[0], least), *shape[1:]))
 
 
 def packed(voxels: np.ndarray, nodes: np.ndarray | None) -> np.ndarray:

@@ -19,7 +19,7 @@ wp.set_module_options({"enable_backward": False})
 CHANNELS = 18  # RGB of light at once, later light, light of an even world; each with light in uniform light
 _PRIOR = 6.0  # weight of the light of voxels, in paths
 _MOST_NODES = 262_144  # of all hair
-_LEAST_OF_STRAND, _MOST_OF_STRAND = 4, 64
+_LEAST_OF_STRAND = 4
 _LONGEST = 2.0  # largest distance of nodes along a strand [voxels]: light of voxels varies along it too
 _SAMPLED = 1000  # number of strands whose length is measured
 
@@ -197,7 +197,7 @@ class NodeSums:
 def _nodes_of(grid, of, most):
     """Return the number of nodes per strand of `_Strands`, at most `most` in all; 0 if nodes would be sparse."""
     width = int(light_texels.sides_of(grid.shape)[0])
-    count = min(most // of.strand_count, _MOST_OF_STRAND, width)
+    count = min(most // of.strand_count, light_texels.MOST_OF_STRAND, width)
     if count < _LEAST_OF_STRAND:
         return 0
     count = width // -(-width // count)  # rows of texels hold whole strands

@@ -137,6 +137,20 @@ def test_texels_contain_voxels_and_nodes(rng):
     assert len(light_texels.packed(voxels, np.zeros((100_000, 11, 4), np.float32))) == layers
 
 
+@pytest.mark.parametrize("flat", range(3))
+def test_flat_hair_has_nodes_in_any_direction(rng, flat):
+    """A sheet of strands, for example a fringe, has about as many nodes whichever way it faces."""
+    points = rng.uniform(0.0, 1.0, (200, 1, 3)) + np.linspace(0.0, 0.05, 4)[:, None] * np.ones(3)
+    points[..., flat] = 0.0
+    grid = grid_of(points, WHITE)
+    nodes = strand_nodes.NodeSums(grid)
+    assert grid.shape[flat] < 4 and nodes.has(0)
+    texels = nodes.texels(0, *ratios_of(grid, 1.0, 0.0, 0.0))
+    assert texels.shape[1] >= 10
+    voxels = np.zeros((*grid.shape[::-1], 4), np.float32)
+    assert light_texels.packed(voxels, texels)[-1, -1, -1, 0] == texels.shape[1]
+
+
 def test_linked_long_and_very_many_strands_have_no_nodes(rng, monkeypatch):
     grid = two_systems(rng)
     assert [strand_nodes.NodeSums(grid).has(index) for index in range(2)] == [True, True]
