@@ -127,26 +127,28 @@ class ShadowMaps:
     def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady):
         hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
         placed = [(strands, _records(strands, view, to_world, steps, is_steady)) for strands, to_world in linked]
-        if not self._are_strands_new(layer, view, lights, placed):
+        drawn_with = self._new_strands(layer, view, lights, placed)
+        if drawn_with is None:
             return
+        self._strands.pop(layer, None)  # in case that drawing fails
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:
             self._draw_strips(layer, placed, light_block, hidden)
+        self._strands[layer] = drawn_with
 
-    def _are_strands_new(self, layer, view, lights, placed):
-        """Whether the strands or the light of a layer differ from those of its last call, which are replaced.
+    def _new_strands(self, layer, view, lights, placed):
+        """Return the value of a layer in `_strands` for strands and a light; None if it was drawn with these.
 
-        Most maps stay while one of many lights moves. Changed strands have a new `StrandsOnGPU`.
+        Most maps stay while one of many lights moves. Changed strands are another `StrandsOnGPU`.
         """
         light, strands = lights["light"][int(view["light_index"])], [one for one, _records in placed]
         drawn_with = view.tobytes(), light.tobytes(), *(records.tobytes() for _one, records in placed)
         surfaces, drawn_before, before = self._strands.get(layer, (None, None, ()))
         if surfaces is self._surfaces[layer] and drawn_before == drawn_with:
             if all(known() is one for known, one in zip(before, strands, strict=True)):
-                return False
-        self._strands[layer] = self._surfaces[layer], drawn_with, [weakref.ref(one) for one in strands]
-        return True
+                return None
+        return self._surfaces[layer], drawn_with, [weakref.ref(one) for one in strands]
 
     def draw_wide(self, lights, surfaces, sphere, casters=None):
         """Draw the maps of surfaces around the hair and write each light's part in them into its record.

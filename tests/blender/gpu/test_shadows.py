@@ -6,6 +6,7 @@ import pytest
 
 from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, surface_textures
 from hair_addon.blender.gpu.programs import uniforms
+from hair_addon.core.errors import HairError
 
 
 def tuft(rng, strand_count=3000):
@@ -122,6 +123,16 @@ def test_only_maps_that_change_are_drawn_again(scene, rng, monkeypatch):
         given[place] = value
         assert maps_drawn(*given) == count
         assert maps_drawn(*given) == 0
+    given[0] = 0.5
+    with monkeypatch.context() as patched:
+        patched.setattr(drawing, "rasterize_strands", failed)
+        with pytest.raises(HairError):
+            maps_drawn(*given)
+    assert maps_drawn(*given) == 1  # a map whose drawing failed is drawn again
+
+
+def failed(*_given):
+    raise HairError("No memory.")
 
 
 @pytest.mark.parametrize("in_compute", [True, False])
