@@ -7,7 +7,7 @@ draw closer where a run narrows, and share runs that split or merge. Strands end
 abruptly on one side. Strands begin where runs begin.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,6 +83,23 @@ def traced(opaque: np.ndarray, steepness: np.ndarray, cards: np.ndarray, across:
         width[moving] *= step.ratios[group]
         last[moving] = row + 1
     return Paths(first, last, places / cell_count, widths / cell_count)
+
+
+def inside(paths: Paths, opaque: np.ndarray, cards: np.ndarray) -> Paths:
+    """Return `Paths` away from the unknown borders of opaque runs: cells are opaque for certain only at their centers.
+
+    In a run's outermost cells, places move into the inner half, and in a run of a single cell close to its center.
+    opaque and cards: as of `traced`.
+    """
+    cell_count = opaque.shape[2]
+    places = paths.places * cell_count
+    cells = np.minimum(places.astype(np.int64), cell_count - 1)
+    sides = np.pad(opaque, ((0, 0), (0, 0), (1, 1)), mode="edge")
+    at = cards[:, None], np.arange(opaque.shape[1])[None]
+    lows, highs = np.where(sides[*at, cells], 0.0, 0.5), np.where(sides[*at, cells + 2], 1.0, 0.5)
+    is_single = highs == lows
+    lows, highs = np.where(is_single, 0.4, lows), np.where(is_single, 0.6, highs)
+    return replace(paths, places=(cells + lows + (highs - lows) * (places - cells)) / cell_count)
 
 
 def _next(occupied, opaque, most):

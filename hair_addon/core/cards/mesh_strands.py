@@ -32,7 +32,7 @@ _REACH = 0.25  # distance of a root to the surface, relative to the strand's len
 _TOUCHING = 1e-5  # distance of a root on the surface, relative to the strand's length
 _INWARD = 0.2  # mean cosine between normals and the directions from the center, below which normals point inward
 _ROWS = 64  # rows in which a card's texture is sampled
-_CELLS, _FEWEST, _MOST = 2, 32, 256  # cells per strand in a row, and the smallest and largest number of cells
+_CELLS, _FEWEST, _MOST = 2, 64, 256  # cells per strand in a row, and the smallest and largest number of cells
 _BATCH = 1 << 15  # largest number of cells in a row of the cards that are followed together
 _STEEP = 1.0  # sideways movement of the border of an opaque part, relative to the distance of rows: 45 degrees
 _LAYER = 4.0  # distance between charts: places on one are never closest to another
@@ -287,6 +287,8 @@ class _Maker:
         owners = np.repeat(np.arange(len(chosen)), [cards[place].count for place in chosen])
         starts = np.concatenate([cards[place].across for place in chosen])
         paths = alpha_paths.traced(opaque[chosen], steepness[chosen], owners, starts)
+        if not self._settings.fills:  # strands that fill a card reach the borders of its opaque parts
+            paths = alpha_paths.inside(paths, opaque[chosen], owners)
         for number, place in enumerate(chosen):
             cards[place].lines = _along(cards[place].chart, cards[place].widths, paths, owners == number)
 

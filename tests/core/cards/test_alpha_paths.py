@@ -88,6 +88,17 @@ def test_points_of_strands_are_opaque(rng):
         assert looked_up(alpha, uvs).mean() > 0.98
 
 
+@pytest.mark.parametrize(("slope", "least"), [(0.0, 0.98), (0.05, 0.75)])
+def test_few_strands_stay_on_fine_locks(slope, least):
+    """Strands stay on 40 locks that are as narrow as the cells in which the texture is sampled."""
+    along, across = (np.mgrid[0:1024, 0:1024] + 0.5) / 1024
+    alpha = ((across + slope * along) * 40.0 % 1.0 < 0.4).astype(np.float64)
+    for count in (1, 3, 8, 20):
+        found = strands_of(alpha, strand_count=count)
+        uvs = np.stack([found.points[:, 0] / WIDTH, (found.points[:, 2] - 0.01) / LENGTH], axis=1)
+        assert len(found.counts) == count and looked_up(alpha, uvs).mean() > least
+
+
 def test_an_opaque_texture_changes_nothing():
     mesh, uvs = card()
     plain = mesh_strands.mesh_strands(mesh, FLOOR, MeshStrandSettings(strand_count=10), uvs)
