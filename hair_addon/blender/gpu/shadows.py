@@ -130,7 +130,7 @@ class ShadowMaps:
         drawn_with = self._new_strands(layer, view, lights, placed)
         if drawn_with is None:
             return
-        self._strands.pop(layer, None)  # in case that drawing fails
+        self._strands.pop(layer, None)  # in case drawing fails
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:

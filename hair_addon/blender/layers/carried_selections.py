@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Saved selections of guides, which are carried to guides that are generated again.
 
-A new guide is selected like the nearest former guide. Centers of locks are as many as before: each is the new guide
-nearest to the former center.
+A new guide is selected like the nearest former guide. The number of centers of locks stays the same: each is
+the new guide nearest to a former center.
 """
 
 from collections.abc import Mapping

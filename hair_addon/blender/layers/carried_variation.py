@@ -80,7 +80,7 @@ def read(guides: Curves | None, surface: Surface, seed: int) -> CarriedVariation
 
 
 def write(guides: Curves, variation: CarriedVariation | None, roots: SurfacePoints, seed: int) -> None:
-    """Remember the seed of guides that were grown at `roots`, and where their variation comes from; None for there."""
+    """Remember the seed of guides grown at `roots`, and the roots that their variation comes from; None for `roots`."""
     if variation is not None and not variation.is_at(roots):
         guides[_NAME] = {"seed": seed, "roots": variation.roots.ravel().tolist()}
     else:

@@ -28,7 +28,7 @@ def toggle(target: Curves, depsgraph: Depsgraph) -> None:
 def have_other_number(target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether guides or hair keep a density that now gives another number, and may be generated again.
 
-    Guides and hair with a status count, as an earlier density may have given a number that was refused. Raises
+    Also true with a status, because the number of an earlier density may have been refused. Raises
     `HairError` if the surface or its mask cannot be read.
     """
     if not _may_change(target):

@@ -174,7 +174,7 @@ class PathSums:
         self.grid, self.taken = grid, 0.0
         self._sums = voxel_sums.VoxelSums(grid)
         self._nodes = strand_nodes.NodeSums(grid)
-        # Parts of light are only for nodes.
+        # Only nodes need the parts of light.
         self._parts = voxel_sums.VoxelSums(grid, strand_nodes.CHANNELS) if len(self._nodes) else None
         self._total = self._squares = 0.0
         self._seen: Seen | None = None
