@@ -6,6 +6,8 @@ has little noise. Later light has more noise and varies less from strand to stra
 of an even world also comes from voxels, because rays to lamps do not find it.
 """
 
+import math
+
 import numpy as np
 import warp as wp
 
@@ -134,19 +136,20 @@ class NodeSums:
     def __init__(self, grid: StrandGrid) -> None:
         self.grid = grid
         self._taken = self._even = 0.0  # number of paths, and all their light in uniform light
-        self._systems: dict[int, _Strands] = {}
-        first_node = 0
+        systems, needs = {}, {}
         for index, system in enumerate(grid.thinned):
-            of = _Strands()
-            of.first_point, of.point_count, of.first_node = system.first_point, system.point_count, first_node
+            of = systems[index] = _Strands()
+            of.first_point, of.point_count = system.first_point, system.point_count
             ends = [*(other.first_point for other in grid.thinned[1:]), len(grid.points)]
             of.strand_count = (ends[index] - system.first_point) // system.point_count
             is_linked = grid.sums_of_systems.count(grid.sums_of_systems[index]) > 1
             if of.strand_count and system.stride == 1 and system.point_count > 1 and not is_linked:
-                of.node_count = _nodes_of(grid, of, _MOST_NODES - first_node)
-                if of.node_count:
-                    self._systems[index] = of
-                    first_node += of.strand_count * of.node_count
+                needs[index] = _need_of(grid, of)
+        first_node, counts = 0, _counts(grid, systems, needs)
+        self._systems: dict[int, _Strands] = {index: systems[index] for index in sorted(counts)}
+        for index, of in self._systems.items():
+            of.first_node, of.node_count = first_node, counts[index]
+            first_node += of.strand_count * of.node_count
         self._sums = wp.zeros((first_node, 6), dtype=wp.float64, device=grid.device)
 
     def __len__(self) -> int:
@@ -194,14 +197,27 @@ class NodeSums:
         return texels.numpy().reshape(-1, of.node_count, 4)
 
 
-def _nodes_of(grid, of, most):
-    """Return the number of nodes per strand of `_Strands`, at most `most` in all; 0 if nodes would be sparse."""
-    width = int(light_texels.sides_of(grid.shape)[0])
-    count = min(most // of.strand_count, light_texels.MOST_OF_STRAND, width)
-    if count < _LEAST_OF_STRAND:
-        return 0
-    count = width // -(-width // count)  # rows of texels hold whole strands
+def _need_of(grid, of):
+    """Return the least number of nodes per strand of `_Strands`."""
     points = grid.points[of.first_point : of.first_point + of.strand_count * of.point_count]
     some = points.reshape((of.strand_count, of.point_count))[:: -(-of.strand_count // _SAMPLED)].numpy()
-    length = np.linalg.norm(np.diff(some, axis=1), axis=-1).sum(axis=1).mean()
-    return count if _LEAST_OF_STRAND <= count and length <= _LONGEST * grid.voxel * count else 0
+    length = float(np.linalg.norm(np.diff(some, axis=1), axis=-1).sum(axis=1).mean())
+    return max(math.ceil(min(length / (_LONGEST * grid.voxel), _MOST_NODES)), _LEAST_OF_STRAND)
+
+
+def _counts(grid, systems, needs):
+    """Return {index: nodes per strand} of the systems that have nodes; needs: {index: least number}.
+
+    Systems that need few nodes in all come first, and the other nodes are shared in proportion, in any order of
+    systems.
+    """
+    width = int(light_texels.sides_of(grid.shape)[0])
+    greatest, total, chosen = min(light_texels.MOST_OF_STRAND, width), 0, []
+    for index in sorted(needs, key=lambda index: needs[index] * systems[index].strand_count):
+        needed = needs[index] * systems[index].strand_count
+        if needs[index] <= greatest and total + needed <= _MOST_NODES:
+            chosen.append(index)
+            total += needed
+    counts = {index: min(_MOST_NODES * needs[index] // total, greatest) for index in chosen}
+    # Whole strands fill rows of texels.
+    return {index: max(width // -(-width // count), needs[index]) for index, count in counts.items()}

@@ -159,6 +159,10 @@ def test_linked_long_and_very_many_strands_have_no_nodes(rng, monkeypatch):
     assert not strand_nodes.NodeSums(replace(grid, voxel=1e-3 * grid.voxel)).has(0)
     monkeypatch.setattr(strand_nodes, "_MOST_NODES", 4 * 149)
     assert [strand_nodes.NodeSums(grid).has(index) for index in range(2)] == [True, False]
+    for most in (4 * 150, 8 * 150):  # the first hair leaves nodes to the second
+        monkeypatch.setattr(strand_nodes, "_MOST_NODES", most)
+        nodes = strand_nodes.NodeSums(grid)
+        assert [nodes.has(index) for index in range(2)] == [True, True] and len(nodes) <= most
     assert voxel_means.CHANNELS < strand_nodes.CHANNELS
 
 
