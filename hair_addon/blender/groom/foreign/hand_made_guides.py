@@ -20,7 +20,7 @@ from ....core.geometry.affine import Affine
 from ....core.geometry.mesh import SurfacePoints, TriMesh, positions
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves, reversal
-from ....core.long_work import Work, part_of, run_now
+from ....core.long_work import Work, part_of
 from ....core.params import Param, plain_value
 from ...data import masks, scene, surface_space, usable_surfaces, vertex_groups, whole_changes
 from ...data.strands import attributes, curves, curves_objects, follow_nodes, posed_strands
@@ -114,11 +114,6 @@ def find_surface(
     return meshes[0]
 
 
-def use_as_guides(curves_object: Object, surface_object: Object, depsgraph: Depsgraph, **options: Any) -> HandMade:
-    """Convert an object's curves to guides; returns `HandMade`. Arguments as of `using_as_guides`."""
-    return run_now(using_as_guides(curves_object, surface_object, depsgraph, **options))
-
-
 @whole_changes.whole
 def using_as_guides(
     curves_object: Object,
@@ -129,7 +124,7 @@ def using_as_guides(
     applies_modifiers: bool = True,
     hair_settings: HairSettings | None = None,
 ) -> Work[HandMade]:
-    """`use_as_guides` as work in steps.
+    """Work that converts the curves of an object to guides, and returns `HandMade`.
 
     every: keep every n-th curve; applies_modifiers: use evaluated curves, not stored ones; hair_settings: of hair
     grown between the guides, None for no hair. Without a mask in the settings, and if the curves do not cover the whole
