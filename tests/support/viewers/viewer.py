@@ -3,12 +3,12 @@
 
 import base64
 import functools
-import html
 import http.server
 import json
 import os
-import re
+import queue
 import shutil
+import signal
 import subprocess
 import threading
 from pathlib import Path
@@ -38,26 +38,43 @@ def seen_by_three(path, folder):
         shutil.copy(HERE / name, site)
     shutil.copy(path, site / "model.glb")
     (site / "node_modules").symlink_to(Path(FOLDER).resolve() / "node_modules")
-    handler = functools.partial(_Quiet, directory=str(site))
+    answers = queue.Queue()
+    handler = functools.partial(_Site, answers, directory=str(site))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        page = _page(f"http://127.0.0.1:{server.server_port}/view.html", folder)
+        found = _answer_to(f"http://127.0.0.1:{server.server_port}/view.html", folder, answers)
         server.shutdown()
-    found = json.loads(html.unescape(re.search(r'<pre id="found">(.*?)</pre>', page, re.DOTALL)[1]))
     assert "error" not in found, found
     picture = folder / "seen.png"
     picture.write_bytes(base64.b64decode(found.pop("picture").split(",")[1]))
     return {**found, "picture": picture}
 
 
-def _page(address, folder):
-    options = ["--headless", "--no-sandbox", f"--user-data-dir={folder / 'profile'}", "--virtual-time-budget=60000"]
-    command = [BROWSER, *options, *_SOFTWARE, "--dump-dom", address]
-    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=_SECONDS).stdout
+def _answer_to(address, folder, answers):
+    """Return what a page sends when it is done. Raises `queue.Empty` after `_SECONDS`."""
+    options = ["--headless", "--no-sandbox", f"--user-data-dir={folder / 'profile'}", "--remote-debugging-port=0"]
+    details = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    with subprocess.Popen([BROWSER, *options, *_SOFTWARE, address], **details) as browser:
+        try:
+            return answers.get(timeout=_SECONDS)
+        finally:
+            os.killpg(browser.pid, signal.SIGTERM)  # the command may be a script that starts the browser
 
 
-class _Quiet(http.server.SimpleHTTPRequestHandler):
+class _Site(http.server.SimpleHTTPRequestHandler):
+    """A folder of files; what a page posts is put into a queue."""
+
     extensions_map = http.server.SimpleHTTPRequestHandler.extensions_map | {".js": "text/javascript"}
+
+    def __init__(self, answers, *given, **named):
+        self._answers = answers
+        super().__init__(*given, **named)
+
+    def do_POST(self):
+        """Put the JSON that the page sends into the queue."""
+        self._answers.put(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+        self.send_response(204)
+        self.end_headers()
 
     def log_message(self, *_given):
         """Write nothing."""
