@@ -22,14 +22,13 @@ from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from draw_frames import median_milliseconds  # beside this file
-
 import hair_addon
 from blend_samples.heads import head
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu.display_transform import DisplayTransform
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, viewport
+from tests.benchmarks.draw_frames import median_milliseconds
 
 NATIVE = [
     (shading, hair_type, kind)

@@ -44,6 +44,7 @@ from hair_addon.blender.render.viewport import hair_picture, viewport
 from hair_addon.blender.render.viewport.history import History
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
+from tests.benchmarks.draw_beside_blender import save
 from tests.benchmarks.edit_guides import bend
 from tests.benchmarks.viewports.crowd import TURN
 
@@ -315,16 +316,6 @@ def main():
                     print_parts(window, hair, action)
             if options.out:
                 save(window.read(*size), options.out / f"{shading}_{label}.png".lower())
-
-
-def save(pixels, path):
-    """Write a picture as it is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    image = bpy.data.images.new("Frame", pixels.shape[1], pixels.shape[0], float_buffer=False)
-    image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
-    bpy.data.images.remove(image)
 
 
 if __name__ == "__main__":

@@ -136,6 +136,8 @@ def show():
                 take_picture(OUT / f"{PART}_{name}.png", 1)
                 yield from shaders_compiled()
         yield from wait(0.2)
+        # A picture that begins anew has the same samples, however often the window was redrawn before.
+        addon().render.viewport.region_pictures.picture_cache.clear()
         take_picture(OUT / f"{PART}_{name}.png", SAMPLES)
         yield
 
