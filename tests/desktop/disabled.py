@@ -14,7 +14,7 @@ import bpy
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
-from tests.desktop.window import MODULE, in_viewport, install, viewport, wait, wait_for  # noqa: E402
+from tests.desktop.window import MODULE, in_viewport, install, viewport, wait, wait_for, window  # noqa: E402
 
 SAMPLES = 300  # of a render that lasts some seconds with any driver
 
@@ -27,6 +27,10 @@ def is_there():
     """Whether the engine is registered, and hair has its settings."""
     engines = {getattr(cls, "bl_idname", "") for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered}
     return ["VELLUS" in engines, hasattr(bpy.types.Curves, "vellus")]
+
+
+def reports():
+    return [report.message for report in bpy.context.window_manager.reports]
 
 
 def build():
@@ -78,7 +82,10 @@ def disable():
     facts["disable"]["rendered"] = (OUT / "disabled.png").exists()
     yield from wait_for(lambda: not any(is_there()), 10.0)
     facts["disable"]["then there"] = is_there()
-    facts["disable"]["reports"] = [one.message for one in bpy.context.window_manager.reports]
+    # Blender shows the reports of a render at the next event of its operator, which is modal.
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=window().width // 2, y=window().height // 2)
+    yield from wait_for(lambda: any("damaged" in report for report in reports()), 10.0)
+    facts["disable"]["reports"] = reports()
     facts["disable"]["listed"] = MODULE in bpy.context.preferences.addons
 
 
