@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..core import geometry, grooming
 from ..core.cards.mesh_strand_settings import MeshStrandSettings
+from ..core.errors import HairError
 from ..core.files.curve_file import TO_Z_UP, Convention, parsed_unit
 from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands, curve_offsets, from_numpy
@@ -151,9 +152,10 @@ def convert_particles(
     """Convert the hair of a mesh object's particle system, and switch the system off.
 
     use: "HAIR" keeps the hairs as strands and derives guides from them, with `DerivationSettings` and changes by name;
-    "GUIDES" uses the hairs as guides and grows strands between them. Of several systems, the active one is converted,
-    or the first with hair. Child hairs are not converted. The result has `hair` and `guides`, the Curves. Blender
-    converts selected objects, so afterwards only the mesh and the new object are selected. Raises `HairError`.
+    "GUIDES" uses the hairs as guides, without `settings`, and grows strands between them. Of several systems, the
+    active one is converted, or the first with hair. Child hairs are not converted. The result has `hair` and `guides`,
+    the Curves. Blender converts selected objects, so afterwards only the mesh and the new object are selected. Raises
+    `HairError`.
 
     >>> scalp = bpy.data.objects["Scalp"]
     >>> system = scalp.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system
@@ -164,6 +166,8 @@ def convert_particles(
     """
     choice(use, "use", ("HAIR", "GUIDES"))
     wanted = changed(DerivationSettings, settings, changes)
+    if use == "GUIDES" and (settings is not None or changes):
+        raise HairError('The guide count has no effect if all hairs become guides: leave it out, or use "HAIR".')
     mesh_object = blender.data.arguments.surface_object(surface)
     return blender.groom.foreign.particle_hair.convert(mesh_object, use, wanted, checked_progress(progress))
 

@@ -197,7 +197,10 @@ def test_particle_hair_is_converted_in_one_step(particles, use_as):
 def test_scripts_and_the_command_line_convert_particle_hair(particles, tmp_path, use_as):
     """The points are those of Blender's conversion, and the system is switched off."""
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"))
-    made = api.convert_particles(particles, use_as, guide_count=12)
+    if use_as == "GUIDES":
+        with pytest.raises(HairError, match="The guide count has no effect"):
+            api.convert_particles(particles, use_as, guide_count=12)
+    made = api.convert_particles(particles, use_as, **({"guide_count": 12} if use_as == "HAIR" else {}))
     kept = made.hair if use_as == "HAIR" else made.guides
     expected = world(next(one for one in bpy.data.objects if one.data == kept))
     assert not particles.modifiers[0].show_render and len(made.guides.curves) == (12 if use_as == "HAIR" else 40)
