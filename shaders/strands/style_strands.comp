@@ -65,6 +65,38 @@ void read_strand(ivec2 first)
   }
 }
 
+// Reads a strand that `keep_strand` has written; returns whether a step has changed it.
+bool read_kept(ivec2 first)
+{
+  vec4 texel = imageLoad(plain_strands, first);
+  if (texel.w < 0.0) {
+    read_strand(first);
+    return false;
+  }
+  half_now = 0;
+  root = texel.xyz;
+  total = texel.w;
+  for (int i = 1; i < styling.point_count; i++) {
+    texel = imageLoad(plain_strands, first + ivec2(i, 0));
+    set_direction(i, texel.xyz);
+    set_length(i, texel.w);
+  }
+  return true;
+}
+
+// Writes a strand between two steps in place of its points: its root and total length, then its directions and lengths.
+// A strand that no step has changed keeps its points, and has a negative length.
+void keep_strand(ivec2 first, bool is_touched)
+{
+  imageStore(plain_strands, first, vec4(root, is_touched ? total : -1.0));
+  if (!is_touched) {
+    return;
+  }
+  for (int i = 1; i < styling.point_count; i++) {
+    imageStore(plain_strands, first + ivec2(i, 0), vec4(direction_at(i), length_at(i)));
+  }
+}
+
 // Sets the clump center of the strand in a step.
 void take_centre()
 {
@@ -160,9 +192,14 @@ void main()
   normal = head.xyz;
   identity = whole(head.w, known_number(4));
   ivec2 first = strand_texel(styling.first_strand + place, 0, POINTS, styling.row_strands);
-  read_strand(first);
   bool is_touched = false;
-  for (int index = 0; index < styling.step_count; index++) {
+  if (first_step > 0) {
+    is_touched = read_kept(first);
+  }
+  else {
+    read_strand(first);
+  }
+  for (int index = first_step; index < end_step; index++) {
     row_now = styling.steps[index];
     kind = row_now.kind;
     seed = row_now.seed;
@@ -183,6 +220,9 @@ void main()
   }
   if (styling.are_centres != 0) {
     write_centre(first, is_touched);
+  }
+  else if (end_step < styling.step_count) {
+    keep_strand(first, is_touched);
   }
   else {
     write_strand(strand, first, is_touched);

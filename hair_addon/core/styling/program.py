@@ -5,12 +5,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import clump, courses, kinds, style_text, trim, wet
 from .base import Cutter, Step, StyleSettings, TreeSettings, has_effect
+
+if TYPE_CHECKING:
+    from .steps import StrandData
 
 # The whole numbers of a step: its kind, of `kinds.STEP_KINDS`; its seed; its row of masks or -1; its row of members or
 # -1; the first of the centers that members count from; a bit for each number that differs between strands; the first of
@@ -147,3 +150,38 @@ def radius_factor(styles: Sequence[StyleSettings]) -> float:
 def wetness(styles: Sequence[StyleSettings]) -> float:
     """Return the wetness for the shading: the largest of all styles."""
     return max((s.amount for s in styles if isinstance(s, wet.Settings) and has_effect(s)), default=0.0)
+
+
+def same_steps(program: Program, data: "StrandData", other: Program, other_data: "StrandData") -> int:
+    """Return the number of first steps that are equal in two programs, with what they read of their strands' data.
+
+    Both are for the same strands and clump centers, of which members alone may differ. A step may read points of clump
+    centers: these are as before if the steps before it are.
+    """
+    count = min(len(program), len(other))
+    choices, numbers = program.choices[:count], program.numbers[:count]
+    is_same = (choices == other.choices[:count]).all(axis=1) & (numbers == other.numbers[:count]).all(axis=1)
+    _kinds, _seeds, masks, levels, _centres, varied, first_varied, packed = choices.T
+    if not np.array_equal(program.courses, other.courses):
+        is_same &= packed == 0
+    is_mask_same = _are_rows_same(data.masks_here, other_data.masks_here)
+    is_member_same = _are_rows_same(data.members_here, other_data.members_here)
+    for step in np.flatnonzero(is_same).tolist():
+        end = first_varied[step] + int(varied[step]).bit_count()
+        are_same = is_mask_same[first_varied[step] : end].all() if varied[step] else True
+        is_same[step] = (
+            are_same
+            and (masks[step] < 0 or is_mask_same[masks[step]])
+            and (levels[step] < 0 or is_member_same[levels[step]])
+        )
+    return count if is_same.all() else int(np.argmin(is_same))
+
+
+def _are_rows_same(rows, others):
+    """Return for each row whether the other array has the same row."""
+    found = np.zeros(len(rows), bool)
+    if rows is others or rows.shape[1:] != others.shape[1:]:
+        return found | (rows is others)
+    for row in range(min(len(rows), len(others))):
+        found[row] = np.array_equal(rows[row], others[row])
+    return found

@@ -55,8 +55,17 @@ class StrandData:
     @cached_property
     def member_limits(self) -> tuple[np.ndarray, np.ndarray]:
         """(levels,) least (at most 0) and greatest member of each level, -1 if no strand has a center."""
-        members = self.members.numpy()
-        return members.min(axis=1, initial=0), members.max(axis=1, initial=-1)
+        return self.members_here.min(axis=1, initial=0), self.members_here.max(axis=1, initial=-1)
+
+    @cached_property
+    def masks_here(self) -> np.ndarray:
+        """`masks` on the CPU, copied once from a GPU."""
+        return self.masks.numpy()
+
+    @cached_property
+    def members_here(self) -> np.ndarray:
+        """`members` on the CPU, copied once from a GPU."""
+        return self.members.numpy()
 
 
 @dataclass(frozen=True)

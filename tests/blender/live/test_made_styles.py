@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu.programs import shaders, uniforms
+from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
@@ -123,6 +124,8 @@ def slide(hair, place, name, value):
 def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
     first = drawn(watched)
+    rests, rest = [], style_maker.StyleMaker.rest
+    monkeypatch.setattr(style_maker.StyleMaker, "rest", lambda self: rests.append(self) or rest(self))
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
         counted.setattr(following, "strands_now", None)
@@ -132,8 +135,10 @@ def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
         comb(3)  # and combing goes on from there
         shown = drawn(watched)
         assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert not rests  # memory of the slider is released once hair is written
     assert np.abs(shown - first).max() > 0.01
     np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+    assert rests
     np.testing.assert_array_equal(drawn(watched), shown)
 
 

@@ -4,9 +4,11 @@
 The program of a stack is the same rows of numbers that core/styling runs: a slider only uploads these. Center strands
 of clumps are made and styled first, level by level, in their own texture. The sources of steps are shared with
 core/styling.
+
+While a slider of a style moves, strands are kept as the styles before it leave them.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import gpu
@@ -15,7 +17,7 @@ import numpy as np
 from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count
 from ....core.styling import kinds, style_text
-from ....core.styling.program import CHOICES, NUMBERS, Program
+from ....core.styling.program import CHOICES, NUMBERS, Program, same_steps
 from ..programs import shaders, uniforms
 from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from . import strand_changes, strand_maker
@@ -30,6 +32,9 @@ MOST_POINTS = 128  # per strand: a thread needs 32 or 48 bytes per point
 
 # Maximum number of strands that are made and styled together: they need 16 bytes per point, 43 MB with 41 points.
 MOST_AT_ONCE = 1 << 16
+
+# Maximum number of points that are kept between styles while a slider moves: 256 MiB.
+MOST_KEPT = 1 << 24
 
 _GROUP_SIZE = 64
 
@@ -72,13 +77,17 @@ class StyleMaker:
     levels: list[_Pass]
     hair: _Pass
     changes: StrandChanges
-    plain: gpu.types.GPUTexture  # (`MOST_AT_ONCE`, P) points of strands before their styles
+    plain: list[gpu.types.GPUTexture]  # (`MOST_AT_ONCE`, P) strands before or between styles: one, or one per part
     _guide_points: np.ndarray | None = None  # of the last `make`
+    # The styles of the last `make`, and how many of their steps are the same as before.
+    _before: "Styling | None" = field(default=None, init=False)
+    _same_before: int = field(default=0, init=False)
+    _contained: int | None = field(default=None, init=False)  # steps whose results `plain` contains; None: nothing
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
         """All textures."""
-        own = [self.locks, self.plain, self.hair.known, *(level.known for level in self.levels)]
+        own = [self.locks, *self.plain, self.hair.known, *(level.known for level in self.levels)]
         if self.centre_maker is not None:
             own += [self.centres, *self.centre_maker.textures]
         return own + self.maker.textures + self.changes.textures
@@ -88,25 +97,82 @@ class StyleMaker:
     ) -> StrandsOnGPU:
         """Make all strands with their styles, like `StrandMaker.make`, for guides from `Styling.guides`."""
         self.maker.require_fitting(strands)
+        before, self._before = self._before, None  # in case drawing fails
         if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
+            before = None
             self.maker.put_guides(guide_points)
             self._guide_points = guide_points.copy()
         if rest is None:
             self.changes.keep(strands)
         texture = strands.texture if rest is None else rest
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
-        if self.centre_maker is not None:
+        are_centres_same, same = self._same_as(before)
+        if self.centre_maker is not None and not are_centres_same:
             self.centre_maker.fill(self.centres)
             for level in self.levels:
                 self._style(program, level, (self.centres, texture), 0, int(level.record["strand_count"]))
-        for first in range(0, strands.strand_count, MOST_AT_ONCE):
-            count = min(MOST_AT_ONCE, strands.strand_count - first)
-            self.maker.fill_some(self.plain, first, count)
-            self._style(program, self.hair, (self.plain, texture), first, count)
+        self._make_hair(program, texture, strands.strand_count, same)
+        self._before = self.styling
         return self.changes.changed(strands) if rest is None else strands
 
-    def _style(self, program, strands, images, first, count):
+    def rest(self) -> None:
+        """Release the memory for strands between styles, as no slider moves."""
+        if len(self.plain) > 1:
+            self.plain, self._contained = self.plain[:1], None
+        self._same_before = 0
+
+    def _same_as(self, before):
+        """Return (whether all clump centers are those of other styles, the number of first steps whose results are).
+
+        (False, None) if even strands without styles differ, or another program would round otherwise.
+        """
+        if before is None or _kinds_of(before.program) != _kinds_of(self.styling.program):
+            return False, None
+        changed: list[int] = []  # levels with other centers
+        for row, (level, known) in enumerate(zip(self.styling.levels, before.levels, strict=True)):
+            same = _same_steps((level.steps, level.data), (known.steps, known.data), changed)
+            if not same == len(level.steps) == len(known.steps):
+                changed.append(row)
+        now, then = ((styling.program, styling.data) for styling in (self.styling, before))
+        return not changed, _same_steps(now, then, changed)
+
+    def _make_hair(self, program, texture, strand_count, same):
+        """Make strands without clump centers; same: the number of first steps with the same results as before."""
+        step_count, contained = len(self.styling.program), self._contained
+        self._contained = None  # in case drawing fails
+        if same is None or (contained is not None and contained > same):
+            contained = None
+        firsts, first_step = range(0, strand_count, MOST_AT_ONCE), contained or 0
+        kept = first_step
+        if same is not None and same < step_count:
+            if first_step < same == self._same_before and self._may_keep(strand_count):
+                kept = same  # a slider moves
+            self._same_before = same
+        parts = self.plain if len(self.plain) > 1 else self.plain * len(firsts)
+        for first, plain in zip(firsts, parts, strict=True):
+            some = first, min(MOST_AT_ONCE, strand_count - first)
+            if contained is None:
+                self.maker.fill_some(plain, *some)
+            if first_step < kept:
+                self._style(program, self.hair, (plain, texture), *some, first_step, kept)
+            self._style(program, self.hair, (plain, texture), *some, kept)
+        self._contained = kept if len(self.plain) == len(firsts) else None
+
+    def _may_keep(self, strand_count):
+        """Whether each part of the strands has its texture, which is created here unless memory would not suffice."""
+        firsts, point_count = range(0, strand_count, MOST_AT_ONCE), self.styling.point_count
+        if len(self.plain) < len(firsts):
+            if strand_count * point_count > MOST_KEPT:
+                return False
+            counts = [min(MOST_AT_ONCE, strand_count - first) for first in firsts]
+            more = [strand_changes.empty_rows(count, point_count)[0] for count in counts[len(self.plain) :]]
+            self.plain = [*self.plain, *more]
+        return True
+
+    def _style(self, program, strands, images, first, count, first_step=0, end_step=None):
+        """Apply steps to some strands of a `_Pass`; before the last step they are written to `plain` again."""
         plain, drawn = images
+        end_step = int(strands.record["step_count"]) if end_step is None else end_step
         program.bind()
         program.uniform_block("styling", strands.block)
         program.uniform_sampler("known", strands.known)
@@ -117,6 +183,8 @@ class StyleMaker:
         self.changes.bind(program)
         program.uniform_int("first_strand", first)
         program.uniform_int("some_count", count)
+        program.uniform_int("first_step", first_step)
+        program.uniform_int("end_step", end_step)
         run_for_each(program, count, _GROUP_SIZE)
         gpu.shader.unbind()
 
@@ -158,7 +226,7 @@ class StyleMaker:
             return False
         before = self._parts(self.styling)
         for (part, data, program), (_part, known, _program) in zip(self._parts(styling), before, strict=True):
-            if not np.array_equal(data.masks.numpy(), known.masks.numpy()):
+            if not _have_same_rows(data, known):
                 part.upload_masks(data)
             part.upload_steps(program)
         self.styling = styling
@@ -227,7 +295,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
             levels.append(_new_pass(own, level.data, level.steps, np.eye(3), point_count))
     hair = _new_pass(record, styling.data, styling.program, axes, point_count)
     plain, _in_row = strand_changes.empty_rows(min(strand_count, MOST_AT_ONCE), point_count)
-    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair, changes, plain)
+    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair, changes, [plain])
 
 
 def _new_pass(record, data, program, axes, point_count):
@@ -256,7 +324,7 @@ def _kinds_of(program):
 
 def _known(data: "StrandData"):
     """Return (texture, strands per row, texels per strand): see shaders/strands/style_strands.comp."""
-    columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
+    columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members_here.T, data.masks_here.T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
     texture, in_row = strand_changes.rows_texture(rows, 4)
@@ -292,8 +360,25 @@ def _are_alike(styling, other):
         styling.tree_levels == other.tree_levels
         and styling.point_count == other.point_count
         and np.array_equal(styling.axes, other.axes)
-        and np.array_equal(styling.data.normals.numpy(), other.data.normals.numpy())
+        and _are_equal(styling.data.normals, other.data.normals)
     )
+
+
+def _are_equal(array, other):
+    return array is other or np.array_equal(array.numpy(), other.numpy())
+
+
+def _same_steps(now, before, changed):
+    """`same_steps` for pairs (program, data), at most up to the first step of a level that is in `changed`."""
+    same = same_steps(*now, *before)
+    readers = np.flatnonzero(np.isin(now[0].choices[:same, CHOICES.index("level")], changed))
+    return int(readers[0]) if len(readers) else same
+
+
+def _have_same_rows(data, other):
+    """Whether strands have the same masks and clump centers."""
+    pairs = (data.masks_here, other.masks_here), (data.members_here, other.members_here)
+    return all(np.array_equal(rows, others) for rows, others in pairs)
 
 
 @shaders.cached
@@ -309,7 +394,7 @@ def _styles_program(point_count, step_kinds):
     for slot, name in enumerate(("plain_strands", "centres")):
         info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=both)
     strand_changes.declare_written(info, first_slot=2)
-    for name in ("first_strand", "some_count"):
+    for name in ("first_strand", "some_count", "first_step", "end_step"):
         info.push_constant("INT", name)
     constants = {"POINTS": point_count, **style_text.constants(), **{f"HAS_{name}": 1 for name in step_kinds}}
     for name, value in constants.items():

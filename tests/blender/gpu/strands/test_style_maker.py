@@ -6,15 +6,17 @@ from dataclasses import replace
 import gpu
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.gpu.programs import shaders, uniforms
-from hair_addon.blender.gpu.strands import style_maker
+from hair_addon.blender.gpu.strands import strand_maker, style_maker
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
 from hair_addon.core.styling.base import Cutter
 from hair_addon.core.styling.courses import settings_with_course
 from hair_addon.core.styling.masks import Inputs, Mask
+from hair_addon.core.styling.program import same_steps
 from hair_addon.core.styling.varied_numbers import NumberMap
 from tests.support.pictures import drawn_strands
 from tests.support.strands.styled import head
@@ -219,6 +221,102 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
     assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centers on two levels
     assert len(shaders.program_cache) == programs
     assert np.quantile(errors(hair, points, hair.styled(*changed)), 0.95) <= CLOSE
+
+
+SLID = (clump.Settings(size=0.04, mask="One"), curl.Settings(), trim.Settings(factor=0.8), frizz.Settings())
+
+
+@pytest.fixture
+def slid(hair, rng, monkeypatch, one_program):
+    """Return (function that makes strands with styles and returns what was done, list of makers)."""
+    monkeypatch.setattr(style_maker, "MOST_AT_ONCE", 64)  # in three parts
+    style, fill = style_maker.StyleMaker._style, strand_maker.StrandMaker.fill_some
+    weights = rng.random(hair.mesh.triangles.shape).astype(np.float32)
+    weights[: len(weights) // 2] = 0.0
+    strands, makers, done = uploaded(hair.plain), [None], []
+
+    def noted(self, program, strands, images, first, count, *of_steps):
+        if strands is not self.hair:
+            done.append("centers")
+        elif first == 0:
+            done.append(of_steps)
+        style(self, program, strands, images, first, count, *of_steps)
+
+    def filled(self, texture, first, count):
+        if first == 0 and self is makers[-1].maker:
+            done.append("fill")
+        fill(self, texture, first, count)
+
+    monkeypatch.setattr(style_maker.StyleMaker, "_style", noted)
+    monkeypatch.setattr(strand_maker.StrandMaker, "fill_some", filled)
+
+    def make(*styles, factor=1.0, guides=None):
+        """Return what was done; the strands must be those of a new maker, bit for bit."""
+        inputs = Inputs(masks={("One", "", False): Mask(weights * np.float32(factor))})
+        styling = hair.bound(*styles, inputs=inputs)
+        makers.append(style_maker.maker_of(hair.binding, styling, 41, np.eye(3), makers[-1]))
+        followed = styling.guides(hair.guides if guides is None else guides).numpy()
+        done.clear()
+        found = drawn_strands.places(makers[-1].make(strands, followed))
+        what = list(done)
+        if "fill" not in what or len(what) > 2:
+            alone = style_maker.new_style_maker(hair.binding, styling, np.eye(3))
+            np.testing.assert_array_equal(found, drawn_strands.places(alone.make(uploaded(hair.plain), followed)))
+        return what
+
+    return make, makers
+
+
+def test_styles_above_a_slider_are_not_applied_again(hair, slid):
+    """While the slider of a style moves, strands stay as the styles before it leave them, also between the parts in
+    which strands are made; other changes apply these styles again.
+    """
+    make, makers = slid
+    frizzed = [(*SLID[:3], replace(SLID[3], amplitude=value)) for value in (0.002, 0.003, 0.004)]
+    curled = [(SLID[0], replace(SLID[1], radius=value), *SLID[2:]) for value in (0.01, 0.012, 0.014)]
+    assert make(*SLID)[-2:] == ["fill", (0,)]
+    last = len(makers[-1].styling.program) - 1
+    assert make(*frizzed[0]) == ["fill", (0,)]  # clump centers are the same
+    assert make(*frizzed[1]) == ["fill", (0, last), (last,)]
+    assert make(*frizzed[2]) == [(last,)]
+    assert make(*frizzed[2]) == [(last,)]  # nothing has changed
+    assert make(*curled[0]) == ["fill", (0,)]
+    first = make(*curled[1])[0][1]
+    assert 0 < first < last
+    assert make(*curled[2]) == [(first,)]
+    assert make(*SLID)[0] == (first,)
+    assert make(*frizzed[0]) == [(first,)]
+    assert make(*frizzed[1]) == [(first, last), (last,)]
+    # Other masks, guides, orders and styles.
+    assert make(*frizzed[1], factor=0.5)[-2:] == ["fill", (0,)]
+    points = 1.1 * hair.guides.numpy()
+    longer = from_numpy(points, hair.guides.roots, hair.device)
+    assert make(*frizzed[1], factor=0.5, guides=longer)[-2:] == ["fill", (0,)]
+    for styles in (SLID[1:], SLID[::-1], SLID[:3], SLID):
+        assert make(*styles)[-1] == (0,)
+    held = strand_textures.bytes_of(makers[-1].textures)
+    assert make(*frizzed[1])[-1] == (0,)
+    assert make(*frizzed[2])[-1] == (last,)
+    assert strand_textures.bytes_of(makers[-1].textures) > held
+    makers[-1].rest()
+    assert strand_textures.bytes_of(makers[-1].textures) == held
+    assert make(*frizzed[1]) == ["fill", (0,)]
+
+
+def test_steps_are_the_same_up_to_what_a_map_changes(hair, varied):
+    """Steps count as the same as long as they read the same masks, numbers and clump centers of strands."""
+    styles = (clump.Settings(size=0.04), curl.Settings(), frizz.Settings(), trim.Settings(factor=0.8))
+
+    def bound(setting, values):
+        return hair.bound(*styles, inputs=Inputs(numbers={setting: varied(values)}))
+
+    for place in (1, 2):
+        one, other = (bound((place, "amount"), values) for values in ((0.5, 0.2), (0.5, 0.1)))
+        found = same_steps(one.program, one.data, other.program, other.data)
+        assert kinds.STEPS[list(kinds.STEP_KINDS)[one.program.choices[found, 0] - 1]] is (curl, frizz)[place - 1]
+        assert same_steps(one.program, one.data, one.program, one.data) == len(one.program)
+    data = replace(one.data, members=wp.array(one.data.members.numpy()[:, ::-1].copy()))
+    assert same_steps(one.program, one.data, one.program, data) == 0
 
 
 def test_masks_that_are_painted_further(hair, rng, one_program):
