@@ -299,9 +299,6 @@ def set_property(dice):
     update()
 
 
-MADE = ("objects", "hair_curves", "materials", "node_groups")
-
-
 def assert_whole():
     """Assert that all guides and hair are complete."""
     for shown in bpy.data.objects:

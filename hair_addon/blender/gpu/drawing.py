@@ -168,18 +168,12 @@ def _parts(strand_count):
     return size, stride
 
 
-def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL, clip_planes=None):
+def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None):
     """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `scene_programs.strip_program`.
 
-    view, lights: records of `uniforms`; samplers: {sampler: texture} of the program besides those of strands; steps:
-    level of detail; clip_planes: (6, 4) for a program that is clipped.
+    record: of `strand_record`; lights: a uniform buffer of `uniforms.LIGHTS`; samplers: {sampler: texture} of the
+    program besides those of strands; clip_planes: (6, 4) for a program that is clipped.
     """
-    record = strand_record(strands, view, object_to_world, steps)
-    draw_strip(strands, program, record, uniforms.uniform_buffer(lights), samplers, clip_planes)
-
-
-def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None):
-    """`draw_strands` with a record of `strand_record` and lights on the GPU."""
     count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights, **uniforms.clipping_blocks(clip_planes)}
     with bound(program, blocks, {**strand_samplers(strands), **(samplers or {})}):

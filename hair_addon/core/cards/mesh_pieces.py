@@ -61,7 +61,7 @@ def pieces_of(mesh: TriMesh) -> list[Piece]:
     if not np.isfinite(mesh.vertices).all():
         raise HairError("The hair mesh has non-finite coordinates: repair the mesh or its modifiers.")
     corners = _welded(mesh.vertices)[mesh.checked_triangles].astype(np.int64)
-    used = _distinct_faces(corners, len(mesh.vertices))
+    used = _distinct_faces(corners)
     if not len(used):
         raise HairError("The hair mesh has no faces with an area.")
     corners = corners[used]
@@ -80,7 +80,7 @@ def _welded(vertices):
     return first[places.ravel()]
 
 
-def _distinct_faces(corners, vertex_count):
+def _distinct_faces(corners):
     """Return indices of the faces with three different corners; of equal faces, the first."""
     ordered = np.sort(corners, axis=1)
     is_face = (ordered[:, 0] < ordered[:, 1]) & (ordered[:, 1] < ordered[:, 2])

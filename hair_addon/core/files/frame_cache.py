@@ -149,16 +149,6 @@ class FrameCache:
         taken, self._complaints = self._complaints, []
         return taken
 
-    def is_being_baked(self) -> bool:
-        """Return whether a process is writing to the folder."""
-        if not claim_of(self.folder / frame_manifest.NAME).exists():
-            return False
-        try:
-            with claim(self.folder / frame_manifest.NAME) as is_free:
-                return not is_free
-        except OSError:  # a folder that cannot be written
-            return False
-
     def _read(self, manifest, name, layout, number):
         path = self.folder / name
         if not os.path.lexists(path):

@@ -121,7 +121,7 @@ def _along_all(points):
 def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Return normalized arc lengths (N,) float32 of the points of ragged polylines, 0 at the root and 1 at the tip.
 
-    points (N, 3) and starts (S+1,): see `resample`; no polyline may be empty.
+    points: (N, 3), concatenated; starts: (S+1,) of each polyline, the last entry is N; no polyline may be empty.
     """
     along, starts = _along_all(points), np.asarray(starts, np.int64)
     first, last = along[starts[:-1]], along[starts[1:] - 1]
@@ -133,7 +133,7 @@ def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
 def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
     """Return values (N,) at the points of ragged polylines, resampled at equal spacing: (S, point_count) float32.
 
-    points (N, 3) and starts (S+1,): see `resample`; no polyline may be empty.
+    points: (N, 3), concatenated; starts: (S+1,) of each polyline, the last entry is N; no polyline may be empty.
     """
     starts = np.asarray(starts, np.int64)
     # Polyline i occupies the range [2 i, 2 i + 1].
@@ -142,35 +142,3 @@ def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, 
     )
     wanted = 2.0 * np.arange(len(starts) - 1)[:, None] + np.linspace(0.0, 1.0, point_count)
     return np.interp(wanted, places, values).astype(np.float32)
-
-
-def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
-    """Return (S, point_count, 3) float32 [m]: ragged polylines, resampled at equal spacing, with the same ends.
-
-    points: (N, 3), concatenated; starts: (S+1,) of each polyline, the last entry is N (Blender's `curve_offset_data`).
-    A polyline of one point, or of zero length, repeats the point.
-    """
-    points = np.asarray(points, dtype=np.float64)
-    starts = np.asarray(starts, dtype=np.int64)
-    counts = np.diff(starts)
-    if len(starts) < 1 or starts[0] != 0 or starts[-1] != len(points) or np.any(counts < 0):
-        raise ValueError("starts must rise from 0 to the number of points")
-    if np.any(counts == 0):
-        raise HairError("{count} curves have no points: delete them.", count=np.count_nonzero(counts == 0))
-    if not np.isfinite(points).all():
-        raise HairError("Some points of the curves have non-finite coordinates: delete those curves.")
-    if len(counts) == 0:
-        return np.empty((0, point_count, 3), np.float32)
-    # Cumulative length over all polylines; the jumps between them are never used as segments.
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    first, last = starts[:-1], starts[1:] - 1
-    wanted = along[first, None] + np.linspace(0.0, 1.0, point_count) * (along[last] - along[first])[:, None]
-    # The segment that contains each wanted length, clamped to its own polyline.
-    segment = np.searchsorted(along, wanted.ravel(), side="right").reshape(wanted.shape) - 1
-    segment = np.clip(segment, first[:, None], np.maximum(last - 1, first)[:, None])
-    ahead = np.minimum(segment + 1, last[:, None])
-    span = along[ahead] - along[segment]
-    fraction = np.clip((wanted - along[segment]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)[..., None]
-    resampled = (1.0 - fraction) * points[segment] + fraction * points[ahead]
-    resampled[:, 0], resampled[:, -1] = points[first], points[last]
-    return resampled.astype(np.float32)

@@ -8,8 +8,6 @@ from itertools import product
 
 import numpy as np
 
-SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
-
 
 def _turned(quaternion):
     """Return the rotation (3, 3) of a quaternion (w, x, y, z) of any length."""

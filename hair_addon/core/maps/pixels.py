@@ -236,12 +236,8 @@ def _within_one(value: float) -> float:
     return wp.min(wp.max(value, 0.0), 1.0)
 
 
-def linear(encoded: np.ndarray) -> np.ndarray:
-    """Return linear float32 values for 8-bit sRGB values, given as floats from 0 to 1 (IEC 61966-2-1)."""
-    return _linear_bytes()[(np.clip(encoded, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)]
-
-
 @cache
 def _linear_bytes():
+    """Return (256,) linear float32 values of 8-bit sRGB (IEC 61966-2-1)."""
     values = np.arange(256) / 255.0
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4).astype(np.float32)

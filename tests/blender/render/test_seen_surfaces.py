@@ -76,9 +76,6 @@ def stage(scene):
     return scene
 
 
-BLUE = (0.1, 0.2, 0.8)
-
-
 @pytest.mark.parametrize(
     "made",
     [

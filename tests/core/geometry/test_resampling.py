@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.curves import resampling
 
 COUNTS = st.lists(st.integers(1, 12), min_size=1, max_size=6)
@@ -19,10 +18,19 @@ def ragged(seed, counts):
 
 
 @given(seed=st.integers(0, 2**32 - 1), counts=COUNTS)
-def test_polylines_are_resampled_as_in_double_precision(seed, counts):
+def test_points_of_polylines_are_evenly_spaced_along_their_own_line(seed, counts):
     points, starts = ragged(seed, counts)
     found = resampling.resample(points, starts, 17)
-    np.testing.assert_allclose(found, strands.resample(points, starts, 17), atol=2e-5)
+    for line, resampled in zip(np.split(points.astype(float), starts[1:-1]), found, strict=True):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        wanted = np.linspace(0.0, along[-1], 17)
+        expected = np.stack([np.interp(wanted, along, axis) for axis in line.T], axis=1)
+        np.testing.assert_allclose(resampled, expected, atol=2e-5)
+
+
+def test_repeated_points_are_passed_over():
+    line = np.float32([(0, 0, 0), (0, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0), (2, 0, 0), (2, 0, 0)])
+    np.testing.assert_allclose(resampling.resample(line, [0, 7], 5)[0, :, 0], [0.0, 0.5, 1.0, 1.5, 2.0])
 
 
 @given(seed=st.integers(0, 2**32 - 1), counts=COUNTS, is_smooth=st.booleans())

@@ -19,7 +19,6 @@ ACTION_SECONDS = 2.0  # estimated time of an artist for one click, field, view o
 STRANDS = 40_000  # of a picture; the window shows fewer
 _EVENTS_PER_METER = 80.0
 _COMB = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
-_TIMEOUT = 90.0  # [s] for the hair to follow
 
 
 @dataclass

@@ -35,8 +35,6 @@ SAMPLES, STRAND_COUNT = map(int, MORE) if MORE else (2, 3_000)
 
 SKIN = (0.45, 0.27, 0.2, 1.0)
 
-MODELS = ("cube", "monkey", "head")
-
 _SOLID, _PREVIEW = {"type": "SOLID", "color_type": "MATERIAL"}, {"type": "MATERIAL"}
 COLUMNS = {
     "studio_default": _SOLID | {"light": "STUDIO", "studio_light": "Default"},

@@ -15,8 +15,6 @@ from .. import bindings, selection, writing
 # Blender's paint modes by `Object.mode`.
 PAINT_MODES = ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT")
 
-_COLORS = ("FLOAT_COLOR", "BYTE_COLOR")
-
 
 def is_painting(active: Object | None) -> bool:
     """Whether an object is a surface with hair in one of Blender's paint modes."""

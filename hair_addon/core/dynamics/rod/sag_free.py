@@ -64,13 +64,11 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
     return SagFree(RestShape(lengths, halves, frames, held), is_clipped.sum(axis=1))
 
 
-def least_stiffness(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> float:
-    """Return the least factor of a material's bending stiffness with which all strands (S, M+1, 3) [m] are stable."""
-    return float(least_stiffnesses(groom, material, gravity).max(initial=0.0))
-
-
 def least_stiffnesses(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> np.ndarray:
-    """Return `least_stiffness` (S,) float64 of each strand; 0 for hanging strands, whose tip is the lowest point."""
+    """Return factors (S,) float64: the least of a material's bending stiffness with which each strand is stable.
+
+    groom: (S, M+1, 3) [m]; gravity [m/s²]. 0 for hanging strands, whose tip is the lowest point.
+    """
     down = np.asarray(gravity, np.float64)
     size = float(np.linalg.norm(down))
     if size == 0.0:
