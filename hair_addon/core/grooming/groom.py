@@ -287,23 +287,10 @@ def distribute_guides(
     load_kernels(device, part_of(progress, 0.0, 0.1))
 
     settings = groom_defaults.complete(settings, mesh, density, texture)
-    relaxing = part_of(progress, 0.1, 0.9)
     if roots is None:
-        placed_on = mesh if shape is None else shape
-        if settings.curvature:
-            bend = geometry.curvature.bend_density(placed_on, settings.curvature)
-            density = bend if density is None else bend * density
-        roots = placement.cvt.place(
-            placed_on,
-            settings.guide_count,
-            settings.seed,
-            settings.relax_iterations,
-            density=density,
-            texture=texture,
-            mirror=(mirror if shape is None else ACROSS_X) if settings.symmetric else None,
-            device=device,
-            progress=lambda part: relaxing("Spreading guides", part),
-        )
+        placed_on, across = (mesh, mirror) if shape is None else (shape, ACROSS_X)
+        placing = part_of(progress, 0.1, 0.9)
+        roots = _placed_roots(placed_on, settings, density, texture, across, device, placing)
     progress("Growing guides", 0.9)
     values: dict[str, Any] = {name: groom_defaults.known(getattr(settings, name)) for name in VARIED}
     values |= {} if varied is None else varied(roots)
@@ -326,6 +313,24 @@ def distribute_guides(
     if settings.symmetric:
         controls = grooming.guide_growth.mirrored(controls, positions(mesh, roots), mirror)
     return Strands(geometry.curves.bspline.evaluate(controls, POINT_COUNT, device), roots)
+
+
+def _placed_roots(mesh, settings, density, texture, mirror, device, progress):
+    """Return the `SurfacePoints` of evenly placed guides, closer together where a mesh bends."""
+    if settings.curvature:
+        bend = geometry.curvature.bend_density(mesh, settings.curvature)
+        density = bend if density is None else bend * density
+    return placement.cvt.place(
+        mesh,
+        settings.guide_count,
+        settings.seed,
+        settings.relax_iterations,
+        density=density,
+        texture=texture,
+        mirror=mirror if settings.symmetric else None,
+        device=device,
+        progress=lambda part: progress("Spreading guides", part),
+    )
 
 
 def bind_hair(
