@@ -29,7 +29,22 @@ def transferred(
     (M, k); apart (M,): distance to the first of them, as a fraction of the extent of the roots, None if unknown. A
     guide at the place of another guide with as many points takes its turns bit for bit.
     """
-    indices, weights = np.asarray(indices), np.where(np.asarray(indices) >= 0, weights, 0.0).astype(np.float64) ** 2
+    indices, weights, is_same = _shares(layers, others, np.asarray(indices), weights, apart)
+    found = others
+    for _layer in layers.turns:
+        found = added(found)
+    found = replace(found, weights=np.einsum("mk,lmk->lm", weights, layers.weights[:, indices]).astype(np.float32))
+    _write_means(found, layers, indices, weights)
+    _write_same(found, layers, np.flatnonzero(is_same), indices[is_same, 0])
+    return found
+
+
+def _shares(layers, others, indices, weights, apart):
+    """Return (indices without -1, squared weights (M, k) with a sum of one, whether guides are the same as the first).
+
+    Arguments: as of `transferred`.
+    """
+    weights = np.where(indices >= 0, weights, 0.0).astype(np.float64) ** 2
     sums = weights.sum(axis=1, keepdims=True)
     weights = np.where(sums > 0.0, weights / np.where(sums > 0.0, sums, 1.0), 0.0)
     weights[sums[:, 0] == 0.0, 0] = 1.0
@@ -39,15 +54,16 @@ def transferred(
         is_same = (apart <= SAME_PLACE) & (np.asarray(layers.counts)[indices[:, 0]] == others.counts)
         weights[is_same] = 0.0
         weights[is_same, 0] = 1.0
-    found = others
-    for _layer in layers.turns:
-        found = added(found)
-    found = replace(found, weights=np.einsum("mk,lmk->lm", weights, layers.weights[:, indices]).astype(np.float32))
-    starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(others.counts)
+    return indices, weights, is_same
+
+
+def _write_means(found, layers, indices, weights):
+    """Write weighted means of turns and stretches to layers of other guides; indices and weights: of `_shares`."""
+    starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(found.counts)
     vectors = _root_vectors(layers)
-    axes, other_axes = _axes(layers), _axes(others)
-    for count in np.unique(others.counts[others.counts > 1]):
-        chosen = np.flatnonzero(others.counts == count)
+    axes, other_axes = _axes(layers), _axes(found)
+    for count in np.unique(found.counts[found.counts > 1]):
+        chosen = np.flatnonzero(found.counts == count)
         places = other_starts[chosen][:, None] + np.arange(1, count)
         turns = np.zeros((len(layers.turns), len(chosen), int(count) - 1, 3))
         stretches = np.zeros(turns.shape[:-1])
@@ -65,17 +81,16 @@ def transferred(
             stretches[:, rows] += share[rows][None, :, None] * layers.stretches[:, sampled]
         found.turns[:, places] = _quaternions(turns)
         found.stretches[:, places] = stretches
-    for guide in np.flatnonzero(is_same):
+
+
+def _write_same(found, layers, guides, sources):
+    """Write turns and stretches of guides (N,) at the places of sources (N,) bit for bit, with the same frames."""
+    starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(found.counts)
+    for guide, source in zip(guides, sources, strict=True):
         own = slice(other_starts[guide], other_starts[guide + 1])
-        source = indices[guide, 0]
         found.turns[:, own] = layers.turns[:, starts[source] : starts[source + 1]]
         found.stretches[:, own] = layers.stretches[:, starts[source] : starts[source + 1]]
-    # The same turns need the same frames.
-    found.tangents[is_same], found.normals[is_same] = (
-        layers.tangents[indices[is_same, 0]],
-        layers.normals[indices[is_same, 0]],
-    )
-    return found
+    found.tangents[guides], found.normals[guides] = layers.tangents[sources], layers.normals[sources]
 
 
 def at_points(layers: GuideLayers, points: np.ndarray, is_chosen: np.ndarray) -> GuideLayers:
