@@ -21,7 +21,7 @@ from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
 from . import kinds, steps, strand_wetness, varied_numbers
 from . import program as programs
-from .base import StyleSettings, TreeSettings, has_effect
+from .base import Step, StyleSettings, TreeSettings, has_effect
 from .clump_trees import HAIR, ClumpTrees, Owner
 from .guide_styles import FollowedGuides, leans
 from .masks import Inputs
@@ -241,70 +241,31 @@ def bind(
     the surface's own, without scale; point_count: points per strand; varied: from
     `varied_numbers.varied_trees`.
     """
-    device = binding.positions.device
     levels = programs.tree_levels(styles, {place: found.tree for place, found in varied.items()})
-    choices = [varied.get(place) for place, style in enumerate(styles) for _level in _levels_of(style)]
+    choosers = [varied.get(place) for place, style in enumerate(styles) for _level in _levels_of(style)]
     keys = programs.mask_keys(styles)
     bindings = [trees.levels(tree)[level] for tree, level in levels]
-    counts = [len(bound.roots) for bound in bindings]
-    first_centres = [0, *np.cumsum(counts).tolist()]
+    first_centres = [0, *np.cumsum([len(bound.roots) for bound in bindings]).tolist()]
     made = programs.strand_steps(styles, inputs.cutters)
     numbers = varied_numbers.places_of(made, inputs.numbers)
     program = programs.compiled(made, keys, first_centres, numbers, inputs.courses)
-    guide_identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
+    identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
-    centre_normals = [side * bound.normals.numpy() for bound in bindings]
-    shared = {
-        "centre_points": wp.zeros((sum(counts), point_count), dtype=wp.vec4, device=device),
-        "centre_normals": _joined([*centre_normals, side * binding.guide_normals.numpy()], wp.vec3, device),
-        "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
-    }
-
-    def data_of(owner: Owner, bound: HairBinding, known: int, step_count: int) -> StrandData:
-        """Return the `StrandData` of strands that may belong to centers of the first `known` levels.
-
-        step_count: of the first steps, which are applied to them.
-        """
-        rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
-        for row in range(known):
-            tree, level = levels[row]
-            if not isinstance(owner, str) and owner[0] == tree and level <= owner[1]:
-                rows[row] = trees.parents(tree, owner[1])[level]
-            else:
-                clumps = _finest_clumps(levels, owner, rows, row)
-                chooser = choices[row]
-                choice = None if chooser is None else chooser.choice(bound, clumps)
-                rows[row] = trees.members(owner, bound, tree, choice)[level]
-        rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
-        clumps = _finest_clumps(levels, owner, rows, known)
-        values = [inputs.masks[key].of_strands(bound, clumps) for key in keys]
-        for step, places in zip(made[:step_count], numbers, strict=False):
-            if places:
-                locks = None if step.level is None else (bindings[step.level], rows[step.level])
-                values += varied_numbers.rows_of(step, inputs.numbers, inputs.cutters, bound, clumps, locks)
-        weights = np.array(values, np.float32).reshape(len(values), len(bound.roots))
-        return StrandData(
-            bound.normals if side == 1 else _joined([side * bound.normals.numpy()], wp.vec3, device),
-            wp.array(bound.identities[0], dtype=int, device=device),
-            wp.array(weights, dtype=float, device=device),
-            wp.array(rows, dtype=int, device=device),
-            **shared,
-        )
-
+    centre_arrays = _centre_arrays(bindings, binding, identities, side, point_count)
+    reader = _StrandReader(inputs, trees, levels, choosers, bindings, made, numbers, keys, side, centre_arrays)
     centres = []
     for row, bound in enumerate(bindings):
         before = _steps_before(program, made, row)
-        centres.append(_Level(bound, first_centres[row], before, data_of(levels[row], bound, row, len(before))))
+        centres.append(_Level(bound, first_centres[row], before, reader.data_of(levels[row], bound, row, len(before))))
     if levels:
         used = {tree for tree, _level in levels}
         trees.keep_only(used.union(*(tree.variants for tree in used)))
-    of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
     leaning = leans(
         styles,
         trees.binder.mesh,
         guides.roots,
-        guide_identities,
-        of_guides,
+        identities,
+        {key: inputs.masks[key].of_guides(guides.roots) for key in keys},
         dict(inputs.targets),
         mask_key,
         inputs.numbers,
@@ -315,13 +276,80 @@ def bind(
         inputs,
         trees,
         program,
-        data_of(HAIR, binding, len(levels), len(made)),
+        reader.data_of(HAIR, binding, len(levels), len(made)),
         np.asarray(axes, np.float64),
         FollowedGuides(trees.binder.mesh, leaning, point_count),
         point_count,
         levels,
         centres,
     )
+
+
+@dataclass(frozen=True)
+class _StrandReader:
+    """Reads the `StrandData` of hair and of the clump centers of its styles."""
+
+    inputs: Inputs
+    trees: ClumpTrees
+    levels: list[tuple[TreeSettings, int]]
+    choosers: list[varied_numbers.VariedTree | None]  # of each level
+    bindings: list[HairBinding]  # of the centers of each level
+    steps: list[Step]
+    numbers: list[tuple[int, ...]]  # of `varied_numbers.places_of`
+    mask_keys: list[tuple[str, str, bool]]
+    side: int  # of `_side`
+    centre_arrays: "dict[str, wp.array]"
+
+    def data_of(self, owner: Owner, bound: HairBinding, known: int, step_count: int) -> StrandData:
+        """Return the `StrandData` of strands that may belong to centers of the first `known` levels.
+
+        step_count: of the first steps, which are applied to them.
+        """
+        device = self.centre_arrays["centre_normals"].device
+        members = self._members_of(owner, bound, known)
+        weights = self._weights_of(bound, members, _finest_clumps(self.levels, owner, members, known), step_count)
+        return StrandData(
+            bound.normals if self.side == 1 else _joined([self.side * bound.normals.numpy()], wp.vec3, device),
+            wp.array(bound.identities[0], dtype=int, device=device),
+            wp.array(weights, dtype=float, device=device),
+            wp.array(members, dtype=int, device=device),
+            **self.centre_arrays,
+        )
+
+    def _members_of(self, owner, bound, known):
+        """Return (levels + 1, S) int32 centers of strands, and their nearest guides in the last row."""
+        rows = np.zeros((len(self.levels) + 1, len(bound.roots)), np.int32)
+        for row in range(known):
+            tree, level = self.levels[row]
+            if not isinstance(owner, str) and owner[0] == tree and level <= owner[1]:
+                rows[row] = self.trees.parents(tree, owner[1])[level]
+            else:
+                clumps, chooser = _finest_clumps(self.levels, owner, rows, row), self.choosers[row]
+                choice = None if chooser is None else chooser.choice(bound, clumps)
+                rows[row] = self.trees.members(owner, bound, tree, choice)[level]
+        rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
+        return rows
+
+    def _weights_of(self, bound, members, clumps, step_count):
+        """Return (masks, S) float32: weights of masks, and the numbers of steps that differ between strands."""
+        values = [self.inputs.masks[key].of_strands(bound, clumps) for key in self.mask_keys]
+        for step, places in zip(self.steps[:step_count], self.numbers, strict=False):
+            if places:
+                locks = None if step.level is None else (self.bindings[step.level], members[step.level])
+                values += varied_numbers.rows_of(step, self.inputs.numbers, self.inputs.cutters, bound, clumps, locks)
+        return np.array(values, np.float32).reshape(len(values), len(bound.roots))
+
+
+def _centre_arrays(bindings, binding, guide_identities, side, point_count):
+    """Return {field of `StrandData`: array} of the centers of all levels; the last are guides, without points."""
+    device = binding.positions.device
+    normals = [side * bound.normals.numpy() for bound in bindings]
+    count = sum(len(bound.roots) for bound in bindings)
+    return {
+        "centre_points": wp.zeros((count, point_count), dtype=wp.vec4, device=device),
+        "centre_normals": _joined([*normals, side * binding.guide_normals.numpy()], wp.vec3, device),
+        "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
+    }
 
 
 def _levels_of(style):
