@@ -17,7 +17,7 @@ STATE = {
     "blender/host/running.py: _work": "end",
     "blender/host/running.py: _timer": "end",
     "blender/live/first_setup.py: _job": "unregister",
-    "blender/live/handlers.py: _evaluated": "Curves during their evaluation",
+    "blender/live/evaluation.py: _evaluated": "Curves during their evaluation",
     "blender/live/handlers.py: _is_opening": "the first update after a file was opened",
     "blender/live/handlers.py: _is_undone": "the first update after an undo",
     "blender/live/hidden_previews.py: _handles": "unregister",

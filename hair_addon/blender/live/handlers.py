@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """bpy.app.handlers: detection of outdated hair from depsgraph updates."""
 
-import contextlib
-
 import bpy
 from bpy.app.handlers import persistent
 
 from ..data import surface_space, usable_surfaces
 from ..data.maps import strand_maps
 from ..data.strands import curves, curves_objects
-from ..groom import frame_faces, hidden_hair, pipeline, staleness
+from ..groom import frame_faces, hidden_hair, staleness
 from ..groom.dynamics import frame_folders
-from ..host import memory, running, scene_time
+from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..render import refused_strands
@@ -20,6 +18,7 @@ from ..render.viewport import viewport
 from ..settings import animated, layer_items, style_items
 from . import (
     copied_faces,
+    evaluation,
     events,
     file_changes,
     flattened_surfaces,
@@ -43,9 +42,6 @@ from . import (
 # Whether a window is about to evaluate a file that was just opened, which reports all datablocks as updated.
 _is_opening = False
 
-# UIDs of Curves that are evaluated now: an update meanwhile must not begin again.
-_evaluated = set()
-
 # Whether an undo or redo may have restored guides without the hair that was written for them, or the reverse.
 _is_undone = False
 
@@ -59,22 +55,62 @@ def after_depsgraph_update(scene, depsgraph):
     global _is_opening, _is_undone
     copies = file_changes.follow([scene])
     is_seen = viewport.is_up_to_date()
-    events.scene_changed(_is_hair_only(reports), _is_light_only(reports))
+    events.scene_changed(updates.are_of_hair(reports), updates.are_of_light(reports))
+    _follow_scene(reports, scene, depsgraph)
+    if _is_opening:
+        _is_opening = False
+        animated.follow(depsgraph)
+        evaluation.evaluate(depsgraph, {})  # for settings that a script has changed since
+        return
+    deformed = updates.deformed(reports)
+    moving_surfaces.shape_changed(deformed & _surfaces())
+    changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
+    transformed = updates.originals(reports, is_transform=True)
+    separated = _follow_surfaces(deformed, changed, transformed, depsgraph)
+    _follow_places(updates.originals(reports, is_geometry=True, is_transform=True), transformed, scene, depsgraph)
+    reported.remember_places()
+    if _is_undone:
+        _is_undone = False
+        _follow_undo(scene, depsgraph)
+    elif copies:
+        simulated_hair.show_known(
+            [guides for guides in frame_folders.simulating() if guides in copies], scene, depsgraph
+        )
+    _follow_painting(reports, {surface for surface in deformed if surface.data in changed}, depsgraph)
+    combed = _follow_geometry(changed, depsgraph)
+    stroke_limits.begin({u.datablock for u in reports if u.is_of(bpy.types.Object)} - {None})
+    for hair in evaluation.of_kind("HAIR"):
+        if hair.vellus.is_stale and hair.vellus.is_live:
+            hidden_previews.hair_changed(hair, is_seen)
+    animated.follow(depsgraph)
+    simulated_hair.follow_settings(scene, depsgraph)
+    if updates.are_of_light(reports) and any(map(_is_outdated, bpy.data.hair_curves)):
+        events.scene_changed()  # styles may read lamps, and settings may be driven by them
+    evaluation.evaluate(depsgraph, combed)
+    simulated_hair.note_combed(combed, scene)
+    if running.job() is None:
+        stored_guide_maps.follow(reports, depsgraph)
+        live_hair.follow_masks(_painted(reports), depsgraph)
+        evaluation.evaluate_other_scenes(scene)
+    if separated:  # last: the update of the view layer calls this handler again
+        copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
+
+
+def _follow_scene(reports, scene, depsgraph):
+    """Update the colors of guides and the compositing of hair after changes of a scene."""
     if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
     # Blender does not report a scene that was copied or deleted.
     if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
         bpy.app.timers.register(composite.repair)
-    if _is_opening:
-        _is_opening = False
-        animated.follow(depsgraph)
-        _evaluate(depsgraph, {})  # for settings that a script has changed since
-        return
-    deformed = updates.deformed(reports)
-    moving_surfaces.shape_changed(deformed & _surfaces())
-    changed = updates.originals([u for u in reports if not _is_only_carried(u, deformed)], is_geometry=True)
-    transformed = updates.originals(reports, is_transform=True)
+
+
+def _follow_surfaces(deformed, changed, transformed, depsgraph):
+    """Mark hair on deformed or edited surfaces; returns the objects whose copied faces were separated.
+
+    deformed: mesh objects; changed, transformed: datablocks with changes of geometry and of transforms.
+    """
     restored = flattened_surfaces.restored(_surfaces() & (deformed | {*transformed}))
     separated = []
     for surface_object in deformed | {*restored}:
@@ -90,7 +126,14 @@ def after_depsgraph_update(scene, depsgraph):
             if flattened_surfaces.note(surface_object, is_edited):
                 continue
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
-    moved = updates.originals(reports, is_geometry=True, is_transform=True)
+    return separated
+
+
+def _follow_places(moved, transformed, scene, depsgraph):
+    """Mark hair that depends on the places of other objects, and preserve the density of scaled surfaces.
+
+    moved: datablocks with changes of geometry or transforms; transformed: of transforms.
+    """
     stale_marks.follow_partings(moved, transformed, depsgraph)
     stale_marks.follow_flow(moved, transformed, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
@@ -98,28 +141,32 @@ def after_depsgraph_update(scene, depsgraph):
     kept_densities.follow(scaled, depsgraph)
     kept_densities.follow_units(scene, depsgraph)
     stale_marks.follow_ramps()
-    reported.remember_places()
-    if _is_undone:
-        _is_undone = False
-        simulated_hair.show_known(frame_folders.simulating(), scene, depsgraph)
-        for datablock in _of_kind("HAIR"):
-            if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
-                datablock.vellus.is_stale = True
-            # The undo step may have been saved before painted looks were written.
-            if strand_maps.has_looks(datablock.vellus):
-                datablock.vellus.is_shading_stale = True
-    elif copies:
-        simulated_hair.show_known(
-            [guides for guides in frame_folders.simulating() if guides in copies], scene, depsgraph
-        )
+
+
+def _follow_undo(scene, depsgraph):
+    """Show baked frames again, and mark hair that undo restored without its guides."""
+    simulated_hair.show_known(frame_folders.simulating(), scene, depsgraph)
+    for datablock in evaluation.of_kind("HAIR"):
+        if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
+            datablock.vellus.is_stale = True
+        # The undo step may have been saved before painted looks were written.
+        if strand_maps.has_looks(datablock.vellus):
+            datablock.vellus.is_shading_stale = True
+
+
+def _follow_painting(reports, edited, depsgraph):
+    """Mark guides and hair with painted images, and with values of edited mesh objects."""
     if any(report.is_of(bpy.types.Image, bpy.types.World) for report in reports):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
     _mark_painted(painted, depsgraph)
-    edited = {surface for surface in deformed if surface.data in changed}
     stale_marks.follow_mapped_surfaces(edited)
     stale_marks.follow_wet_places(edited, painted)
     live_layers.follow_masks({surface for surface in edited if surface.mode == "OBJECT"}, depsgraph)
+
+
+def _follow_geometry(changed, depsgraph):
+    """Forget what was read of changed meshes and Curves; returns {guide Curves that have moved: (N, 3) points}."""
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Mesh):
@@ -128,22 +175,7 @@ def after_depsgraph_update(scene, depsgraph):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
                 combed[datablock] = stroke_limits.limited(datablock, reported.points_of(datablock), depsgraph)
-    stroke_limits.begin({u.datablock for u in reports if u.is_of(bpy.types.Object)} - {None})
-    for hair in _of_kind("HAIR"):
-        if hair.vellus.is_stale and hair.vellus.is_live:
-            hidden_previews.hair_changed(hair, is_seen)
-    animated.follow(depsgraph)
-    simulated_hair.follow_settings(scene, depsgraph)
-    if _is_light_only(reports) and any(map(_is_outdated, bpy.data.hair_curves)):
-        events.scene_changed()  # styles may read lamps, and settings may be driven by them
-    _evaluate(depsgraph, combed)
-    simulated_hair.note_combed(combed, scene)
-    if running.job() is None:
-        stored_guide_maps.follow(reports, depsgraph)
-        live_hair.follow_masks(_painted(reports), depsgraph)
-        _evaluate_other_scenes(scene)
-    if separated:  # last: the update of the view layer calls this handler again
-        copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
+    return combed
 
 
 def _surfaces():
@@ -164,51 +196,13 @@ def _painted(reports):
     found = {o for o in updates.deformed(reports) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
     if not any(report.is_of(bpy.types.Image) for report in reports):
         return found
-    surfaces = {curves.grown_on(hair) for hair in _of_kind("HAIR")} - {None}
+    surfaces = {curves.grown_on(hair) for hair in evaluation.of_kind("HAIR")} - {None}
     return found | {surface for surface in surfaces if surface.mode == "TEXTURE_PAINT"}
-
-
-def _is_hair_only(reports):
-    """Whether only the geometry of Curves has changed, and not surfaces, lights or the world."""
-    # Blender reports no datablock for changes of visibility.
-    return len(reports) > 0 and all(map(_are_curves, reports))
-
-
-def _is_light_only(reports):
-    """Whether only lamps and their places have changed."""
-    # Blender reports an embedded node tree together with the lamp, material or world that owns it.
-    owners = [report for report in reports if not _is_own_tree(report)]
-    return len(owners) > 0 and all(
-        report.is_of(bpy.types.Light) or _type_of_object(report) == "LIGHT" for report in owners
-    )
 
 
 def _is_outdated(datablock):
     """Whether guides or hair are about to be evaluated."""
     return datablock.vellus.is_live and (datablock.vellus.is_stale or datablock.vellus.is_shading_stale)
-
-
-def _is_own_tree(report):
-    return report.is_of(bpy.types.NodeTree) and (report.datablock is None or report.datablock.is_embedded_data)
-
-
-def _is_hair_only_in_frame(reports):
-    """Whether a change of the frame changed only Curves: Blender reports all evaluated datablocks, but no images."""
-    if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
-        return False
-    others = [report for report in reports if not report.is_of(bpy.types.Action, bpy.types.Camera)]
-    return all(_are_curves(report) or _type_of_object(report) == "CAMERA" for report in others)
-
-
-def _type_of_object(report):
-    """Blender's type of an object; None for other datablocks and for deleted objects."""
-    return report.datablock.type if report.is_of(bpy.types.Object) and report.datablock is not None else None
-
-
-def _are_curves(report):
-    if report.is_of(bpy.types.Object):
-        return _type_of_object(report) == "CURVES" and not report.is_transform
-    return report.is_of(bpy.types.Curves)
 
 
 def _mark_painted(images, depsgraph):
@@ -233,100 +227,6 @@ def _mark_painted(images, depsgraph):
         reported.painting_cache.keep(uid, True)
 
 
-def _of_kind(kind):
-    return [curves for curves in bpy.data.hair_curves if curves.vellus.kind == kind]
-
-
-def _evaluate(depsgraph, combed):
-    """Evaluate guides first, then their hair. During a long operation, updates wait for its end.
-
-    combed: {guide Curves that have moved: their (N, 3) points}.
-    """
-    if running.job() is not None:
-        for guides in combed:
-            stale_marks.mark_followers(guides)
-        return
-    # Callbacks run last to first. An unexpected error is raised after all of them, so that it stops no other hair.
-    with contextlib.ExitStack() as stack:
-        # In a window hair that needs much memory waits for an operator; a render must not lack hair.
-        stack.enter_context(memory.asking(running.has_window() and not running.is_rendering()))
-        stack.callback(live_hair.show_styles, depsgraph)
-        for hair in reversed(_of_kind("HAIR")):
-            stack.callback(_evaluate_hair, hair, depsgraph, combed)
-        for guides in reversed(_of_kind("GUIDES")):
-            stack.callback(_evaluate_guides, guides, depsgraph, combed)
-        stack.callback(live_layers.follow, combed, depsgraph)
-
-
-@contextlib.contextmanager
-def _once(datablock):
-    """Leave Curves out of updates during their evaluation."""
-    uid = datablock.session_uid
-    _evaluated.add(uid)
-    try:
-        yield
-    finally:
-        _evaluated.discard(uid)
-
-
-def _evaluate_guides(guides, depsgraph, combed):
-    if guides.session_uid in _evaluated:
-        return
-    if guides.vellus.is_shading_stale:
-        looks.evaluate_guides(guides)
-    if guides.vellus.is_stale and guides.vellus.is_live and _is_ready(guides, depsgraph):
-        if flattened_surfaces.is_waiting(guides):
-            return
-        with _once(guides):
-            pipeline.evaluate(guides, depsgraph)
-        events.strands_computed(guides)
-        stale_marks.follow_mask(guides, depsgraph)
-        combed[guides] = None  # to be read
-
-
-def _evaluate_hair(hair, depsgraph, combed):
-    if hair.session_uid in _evaluated:
-        return
-    state = hair.vellus
-    follows = state.guide_curves in combed
-    if not (state.is_live and _is_ready(hair, depsgraph)):
-        # Guides that are reported for the first time may be the guides that the hair was made with.
-        state.is_stale = state.is_stale or (follows and staleness.is_left_by_undo(hair))
-    elif state.is_stale and flattened_surfaces.is_waiting(hair):
-        pass
-    elif state.is_stale and not live_hair.is_ahead(hair):
-        with _once(hair):
-            live_hair.regenerate(hair, depsgraph)
-    elif follows:
-        live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
-    if state.is_shading_stale:
-        live_hair.evaluate_shading(hair)
-
-
-def _is_ready(datablock, depsgraph):
-    """Whether the surface is missing, or in Object Mode and evaluated; the surface of the guides also in Object Mode.
-
-    Hair waits until edit and paint modes are left, and hair of another scene until that scene is evaluated.
-    """
-    surface, grown_on = datablock.surface, curves.grown_on(datablock)
-    if grown_on is not None and grown_on.mode != "OBJECT":
-        return False
-    return surface is None or (surface.mode == "OBJECT" and usable_surfaces.is_in(surface, depsgraph))
-
-
-def _evaluate_other_scenes(scene):
-    """Regenerate outdated hair of scenes that are not shown: their updates call `after_depsgraph_update`."""
-    if scene != bpy.context.scene or len(bpy.data.scenes) == 1:
-        return
-    outdated = {c.surface for c in bpy.data.hair_curves if c.vellus.is_stale and c.vellus.is_live} - {None}
-    for surface_object in outdated:
-        scenes = surface_object.users_scene
-        layers = [] if scene in scenes else [layer for its in scenes for layer in its.view_layers]
-        layer = next((layer for layer in layers if surface_object.name in layer.objects), None)
-        if layer is not None:
-            layer.update()
-
-
 @persistent
 def before_frame_change(_scene, _depsgraph):
     """Remember setting values, to detect animated changes."""
@@ -338,9 +238,9 @@ def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces; regenerate animated hair, in renders too."""
     reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
     if scene_time.is_shown(depsgraph):
-        events.scene_changed(is_hair_only=_is_hair_only_in_frame(reports))
+        events.scene_changed(is_hair_only=updates.are_of_hair_in_frame(reports))
         for report in reports:
-            if report.is_geometry and _type_of_object(report) == "CURVES":
+            if report.is_geometry and updates.type_of_object(report) == "CURVES":
                 events.hair_evaluated(report.datablock)
         deformed = updates.deformed(reports)
         moving_surfaces.frame_changed(deformed & _surfaces())
@@ -355,7 +255,7 @@ def after_frame_change(scene, depsgraph):
         moved = live_layers.follow_frame(depsgraph)
         if animated.follow(depsgraph) or moved:
             # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-            _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
+            evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
             if is_render:
                 live_hair.write_all()
     finally:
@@ -413,9 +313,9 @@ def after_import(context=None, *_args):
         return
     _show_hidden()
     file_changes.accept_state()
-    for hair in _of_kind("HAIR"):
+    for hair in evaluation.of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus.styles, style_items.default_name)
-    for guides in _of_kind("GUIDES"):
+    for guides in evaluation.of_kind("GUIDES"):
         style_items.make_names_readable(guides.vellus.layers, lambda _item: layer_items.FIRST_NAME)
 
 
@@ -443,7 +343,7 @@ def after_load(*_args):
 
 def _hide_drawn_hair():
     """Stop Blender from drawing hair that Vellus draws, as in older files and after the add-on was disabled."""
-    for hair in _of_kind("HAIR"):
+    for hair in evaluation.of_kind("HAIR"):
         if hair.vellus.is_drawn:
             curves_objects.draw_natively(hair, False)
 

@@ -77,3 +77,41 @@ def deformed(updates: list[Update]) -> set[bpy.types.Object]:
     """Return the mesh objects whose evaluated shape may have changed."""
     changed = (u.datablock for u in updates if u.is_geometry and u.is_of(bpy.types.Object) and u.datablock is not None)
     return {one for one in changed if one.type == "MESH"}
+
+
+def are_of_hair(updates: list[Update]) -> bool:
+    """Whether only the geometry of Curves has changed, and not surfaces, lights or the world."""
+    # Blender reports no datablock for changes of visibility.
+    return len(updates) > 0 and all(map(_are_curves, updates))
+
+
+def are_of_light(updates: list[Update]) -> bool:
+    """Whether only lamps and their places have changed."""
+    # Blender reports an embedded node tree together with the lamp, material or world that owns it.
+    owners = [update for update in updates if not _is_own_tree(update)]
+    return len(owners) > 0 and all(
+        update.is_of(bpy.types.Light) or type_of_object(update) == "LIGHT" for update in owners
+    )
+
+
+def are_of_hair_in_frame(updates: list[Update]) -> bool:
+    """Whether a change of the frame changed only Curves: Blender reports all evaluated datablocks, but no images."""
+    if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
+        return False
+    others = [update for update in updates if not update.is_of(bpy.types.Action, bpy.types.Camera)]
+    return all(_are_curves(update) or type_of_object(update) == "CAMERA" for update in others)
+
+
+def type_of_object(update: Update) -> str | None:
+    """Blender's type of an object; None for other datablocks and for deleted objects."""
+    return update.datablock.type if update.is_of(bpy.types.Object) and update.datablock is not None else None
+
+
+def _is_own_tree(update):
+    return update.is_of(bpy.types.NodeTree) and (update.datablock is None or update.datablock.is_embedded_data)
+
+
+def _are_curves(update):
+    if update.is_of(bpy.types.Object):
+        return type_of_object(update) == "CURVES" and not update.is_transform
+    return update.is_of(bpy.types.Curves)
