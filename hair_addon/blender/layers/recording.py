@@ -56,11 +56,13 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
         return False
     had_status = bool(state.status)
     state.status = ""
-    layers, shown = read(guides, depsgraph, is_shown=True), None
+    shown, weights = None, _weights(guides, depsgraph, is_shown=True)
+    layers = layer_attributes.opened(guides, layer_items.identities_of(state), weights, state.active_layer)
     if is_combed and np.isfinite(points).all():
         shape = _shape(guides, layers)
         is_other = guide_layers.is_other(layers, points, shape)
-        before, (layers, refusal) = layers, _recorded(layers, state, points, shape, is_other)
+        before, (layers, is_made, refusal) = layers, _recorded(layers, state, points, shape, is_other)
+        is_other &= ~is_made
         shape = guide_layers.composed_again(layers, shape, is_other)
         shown = _shown(points, shape, layers.counts, guide_layers.is_other(layers, points, shape, is_other))
         if had_status:
@@ -105,7 +107,8 @@ def _shape(guides, layers):
 
 
 def _recorded(layers, state, points, shape, is_other):
-    """Return (`GuideLayers` with edited points in the active layer, refusal or an empty text).
+    """Return (`GuideLayers` with edited points in the active layer, (G,) bool: guides that they reproduce, refusal or
+    an empty text).
 
     is_other: (G,), guides whose points differ from the shape (N, 3).
     """
@@ -118,9 +121,9 @@ def _recorded(layers, state, points, shape, is_other):
         # Guides that were added, and roots that were moved, are still followed.
         weights = layers.weights.copy()
         weights[0] = 0.0
-        found, _changed = guide_layers.recorded(layers.weighted(weights), 0, points)
-        return replace(found, weights=layers.weights), refusal
-    return guide_layers.recorded(layers, place, points, shape, is_other, in_place=True)[0], refusal
+        found, is_made = guide_layers.recorded(layers.weighted(weights), 0, points)
+        return replace(found, weights=layers.weights), is_made, refusal
+    return *guide_layers.recorded(layers, place, points, shape, is_other, in_place=True), refusal
 
 
 def show_layers(guides: Curves, layers: GuideLayers) -> bool:
@@ -154,8 +157,14 @@ def _note(guides, points, fingerprint):
         state.written = state.layered
 
 
-def read(guides: Curves, depsgraph: Depsgraph, is_shown: bool = False) -> GuideLayers:
-    """Return the `GuideLayers` of guides with their weights; is_shown: weights of the present points."""
+def read(guides: Curves, depsgraph: Depsgraph) -> GuideLayers:
+    """Return the `GuideLayers` of guides with their weights."""
+    weights = _weights(guides, depsgraph)
+    return layer_attributes.read(guides, layer_items.identities_of(guides.vellus), weights)
+
+
+def _weights(guides, depsgraph, is_shown=False):
+    """Return the weights (L, G) float32 of layers; is_shown: those of the present points."""
     state = guides.vellus
     weights = np.zeros((len(state.layers), len(guides.curves)), np.float32)
     for row, item in zip(weights, state.layers, strict=True):
@@ -167,7 +176,7 @@ def read(guides: Curves, depsgraph: Depsgraph, is_shown: bool = False) -> GuideL
         if mask is None:
             mask = _mask(guides, item.identity, name, depsgraph)
         row *= mask
-    return layer_attributes.read(guides, layer_items.identities_of(state), weights)
+    return weights
 
 
 def note_shown(guides: Curves, depsgraph: Depsgraph) -> None:

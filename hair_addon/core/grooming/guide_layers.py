@@ -28,7 +28,8 @@ class GuideLayers:
     base (N, 3) float32; counts (G,): points of each guide; normals, tangents (G, 3): perpendicular unit axes of the
     frame at each root; turns (L, N, 4) float32: quaternion w, x, y, z of the segment that ends at a point, zero counts
     as no turn; stretches (L, N) float32: logarithm of its length ratio; weights (L, G) float32: of each layer and
-    guide, at least 0.
+    guide, at least 0. For `composed` and `recorded`, turns
+    and stretches may also be tuples of L contiguous arrays, such as those in Blender's memory.
     """
 
     base: np.ndarray
@@ -45,12 +46,11 @@ class GuideLayers:
         require_count("points", int(np.sum(self.counts)), len(self.base))
         for values in (self.normals, self.tangents):
             require_count("axes of guides", len(values), guide_count)
-        for name, values, shape in (
-            ("turns", self.turns, (layer_count, len(self.base), 4)),
-            ("stretches", self.stretches, (layer_count, len(self.base))),
-            ("weights", self.weights, (layer_count, guide_count)),
-        ):
-            require_count(name, values.size, int(np.prod(shape)))
+        require_count("weights", self.weights.size, layer_count * guide_count)
+        require_count("layers with stretches", len(self.stretches), layer_count)
+        for turns, stretches in zip(self.turns, self.stretches, strict=True):
+            require_count("turns", turns.size, 4 * len(self.base))
+            require_count("stretches", stretches.size, len(self.base))
 
     def weighted(self, weights: np.ndarray) -> "GuideLayers":
         """Return the same layers with other weights (L, G)."""
@@ -120,12 +120,12 @@ def recorded(
     is_edited: np.ndarray | None = None,
     in_place: bool = False,
 ) -> tuple[GuideLayers, np.ndarray]:
-    """Return (layers whose layer of index `active` reproduces edited guides, (G,) bool: guides that changed).
+    """Return (layers whose layer of index `active` reproduces edited guides, (G,) bool: guides that it reproduces).
 
     points: (N, 3) of the edited guides; shape: (N, 3) float32, the composed points if they are known; is_edited: (G,),
-    `is_other` of points and shape if it is known; in_place: whether
-    the arrays of `layers` may change. Other layers do not change. The base of a guide moves with its root. Guides for
-    which the active layer has a weight below `LEAST_WEIGHT` do not change.
+    `is_other` of points and shape if it is known; in_place: whether the arrays of `layers` may change. Other layers do
+    not change. The base of a guide moves with its root. Guides for which the active layer has a weight below
+    `LEAST_WEIGHT` do not change. Of guides that the layer had reproduced before, none count.
     """
     points = np.asarray(points, np.float32)
     require_count("edited points", len(points), len(layers.base))
@@ -140,8 +140,10 @@ def recorded(
     if not len(guides):
         return layers, is_changed
     if not in_place:
-        layers = replace(layers, turns=layers.turns.copy(), stretches=layers.stretches.copy())
-    grooming.layer_kernels.record(layers, active, points, guides)
+        layers = replace(
+            layers, turns=np.array(layers.turns, order="C"), stretches=np.array(layers.stretches, order="C")
+        )
+    is_changed[guides] = grooming.layer_kernels.record(layers, active, points, guides, _TOLERANCE)
     return layers, is_changed
 
 
@@ -152,29 +154,16 @@ def is_other(
 
     is_chosen: (G,) bool, guides to compare, None for all; the result is false for the others.
     """
-    counts = np.asarray(layers.counts)
-    if is_chosen is None:
-        is_chosen = _are_unequal(counts, points, others)
-    if not is_chosen.all():
-        of_chosen = np.repeat(is_chosen, counts)
-        points, others, counts = points[of_chosen], others[of_chosen], np.where(is_chosen, counts, 0)
-    if not len(points):
-        return np.zeros(len(counts), bool)
-    has_points = counts > 0
-    firsts = 3 * geometry.strands.curve_offsets(counts)[:-1][has_points].astype(np.int64)
-    apart, size = np.zeros(len(counts), np.float32), np.zeros(len(counts), np.float32)
-    apart[has_points] = np.maximum.reduceat(np.abs(points - others).ravel(), firsts)
-    size[has_points] = np.maximum.reduceat(np.abs(others).ravel(), firsts)
-    return ~(apart <= _TOLERANCE * size)  # true for NaN too
-
-
-def _are_unequal(counts, points, others):
-    """Return (G,) bool: whether any coordinate of a guide's points (N, 3) differs from `others` (N, 3)."""
-    is_unequal, has_points = np.zeros(len(counts), bool), counts > 0
-    if len(points):
-        firsts = 3 * geometry.strands.curve_offsets(counts)[:-1][has_points].astype(np.int64)
-        is_unequal[has_points] = np.logical_or.reduceat((points != others).ravel(), firsts)
-    return is_unequal
+    guide_count = len(layers.counts)
+    guides = np.arange(guide_count) if is_chosen is None else np.flatnonzero(is_chosen)
+    starts = geometry.strands.curve_offsets(layers.counts)
+    require_count("points", len(points), int(starts[-1]))
+    require_count("other points", len(others), int(starts[-1]))
+    if is_chosen is not None:
+        require_count("chosen guides", len(is_chosen), guide_count)
+    found = np.zeros(guide_count, bool)
+    found[guides] = grooming.layer_kernels.are_other(starts, points, others, guides, _TOLERANCE)
+    return found
 
 
 def moved(layers: GuideLayers, move: Callable[[np.ndarray], np.ndarray]) -> GuideLayers:
@@ -272,7 +261,7 @@ def _rooted(layers, points, starts):
     if is_new.any():
         of_new = np.repeat(is_new, layers.counts)
         base = np.where(of_new[:, None], points, base)
-        turns, stretches = layers.turns.copy(), layers.stretches.copy()
+        turns, stretches = np.array(layers.turns, order="C"), np.array(layers.stretches, order="C")
         turns[:, of_new], stretches[:, of_new] = (1.0, 0.0, 0.0, 0.0), 0.0
         layers = replace(layers, turns=turns, stretches=stretches)
     no_axes = ~(_are_not_zero(normals) & _are_not_zero(tangents))

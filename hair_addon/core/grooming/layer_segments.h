@@ -160,7 +160,11 @@ const auto numbers_at = [&](const float* values, const int* rows) {
   for (int lane = 0; lane < WIDTH; ++lane) found[lane] = values[rows[lane]];
   return found;
 };
-const auto turns_at = [&](const wp::vec4* values, const int* rows) {
+const auto finite_of = [&](lanes x) { return x - x == 0.0f ? x : lanes(0.0f); };
+const auto turns_of = [&](int layer) { return reinterpret_cast<const wp::vec4*>(turns.data[layer]); };
+const auto stretches_of = [&](int layer) { return reinterpret_cast<const float*>(stretches.data[layer]); };
+const auto turns_at = [&](int layer, const int* rows) {
+  const wp::vec4* values = turns_of(layer);
   const auto pair = [&](int lane) {
     const four low = *reinterpret_cast<const four*>(values + rows[lane]);
     const four high = *reinterpret_cast<const four*>(values + rows[lane + 4]);
@@ -171,23 +175,23 @@ const auto turns_at = [&](const wp::vec4* values, const int* rows) {
   const lanes high_01 = __builtin_shufflevector(r0, r1, 2, 10, 3, 11, 6, 14, 7, 15);
   const lanes low_23 = __builtin_shufflevector(r2, r3, 0, 8, 1, 9, 4, 12, 5, 13);
   const lanes high_23 = __builtin_shufflevector(r2, r3, 2, 10, 3, 11, 6, 14, 7, 15);
-  return quaternion{__builtin_shufflevector(low_01, low_23, 0, 1, 8, 9, 4, 5, 12, 13),
-                    __builtin_shufflevector(low_01, low_23, 2, 3, 10, 11, 6, 7, 14, 15),
-                    __builtin_shufflevector(high_01, high_23, 0, 1, 8, 9, 4, 5, 12, 13),
-                    __builtin_shufflevector(high_01, high_23, 2, 3, 10, 11, 6, 7, 14, 15)};
+  return quaternion{finite_of(__builtin_shufflevector(low_01, low_23, 0, 1, 8, 9, 4, 5, 12, 13)),
+                    finite_of(__builtin_shufflevector(low_01, low_23, 2, 3, 10, 11, 6, 7, 14, 15)),
+                    finite_of(__builtin_shufflevector(high_01, high_23, 0, 1, 8, 9, 4, 5, 12, 13)),
+                    finite_of(__builtin_shufflevector(high_01, high_23, 2, 3, 10, 11, 6, 7, 14, 15))};
 };
+const auto stretches_at = [&](int layer, const int* rows) { return finite_of(numbers_at(stretches_of(layer), rows)); };
 
 const int layer_count = static_cast<int>(weights.shape[0]);
-const size_t guide_count = weights.shape[1], point_count = base.shape[0];
+const size_t guide_count = weights.shape[1];
 // Fetches what the next block needs of a layer at the same places: a line of memory is four turns, or 16 stretches.
 const int ahead = first_of[WIDTH - 1] + count_of[WIDTH - 1] - first_of[0];
 const auto fetch_ahead = [&](int layer, int place, const int* rows) {
-  const size_t first = layer * point_count + ahead;
   if (place % 4 == 1) {
-    for (int lane = 0; lane < WIDTH; ++lane) __builtin_prefetch(turns.data + first + rows[lane]);
+    for (int lane = 0; lane < WIDTH; ++lane) __builtin_prefetch(turns_of(layer) + ahead + rows[lane]);
   }
   if (place % 16 == 1) {
-    for (int lane = 0; lane < WIDTH; ++lane) __builtin_prefetch(stretches.data + first + rows[lane]);
+    for (int lane = 0; lane < WIDTH; ++lane) __builtin_prefetch(stretches_of(layer) + ahead + rows[lane]);
   }
 };
 // Weights of a layer, which are zero in all lanes of a hidden layer.
@@ -229,4 +233,29 @@ const auto advance = [&](const vector& segment) {
   found = found - along.direction * dot(found, along.direction);
   along.tangent = unit_of(chosen(size_of(found) < 1e-6f, tangent, found));
   along.side = cross(along.direction, along.tangent);
+};
+
+// The end of the present segment with a turn and a stretch; point: its end in the base. Sums are in double precision.
+doubles shift_x = 0.0, shift_y = 0.0, shift_z = 0.0;
+flags is_base = lanes(0.0f) == lanes(0.0f);
+const auto end_of = [&](const vector& point, const quaternion& turn, lanes stretch) {
+  const auto is_changed = is_bent(turn) | (stretch != 0.0f);
+  if (any_of(is_changed)) {
+    const vector local = unit_of(turned(unit_turn(turn), up));
+    lanes length = along.length;
+    if (any_of(stretch != 0.0f)) {
+      const lanes ratio = exponential(clamped(stretch, lanes(-LONGEST), lanes(LONGEST)));
+      length = stretch != 0.0f ? higher_of(length, short_length) * ratio : length;
+    }
+    const vector after = (along.tangent * local.x + along.side * local.y + along.direction * local.z) * length;
+    const vector shift = chosen(is_changed, after - along.segment, zero);
+    shift_x += __builtin_convertvector(shift.x, doubles);
+    shift_y += __builtin_convertvector(shift.y, doubles);
+    shift_z += __builtin_convertvector(shift.z, doubles);
+    is_base &= is_changed == 0;
+  }
+  const lanes x = __builtin_convertvector(__builtin_convertvector(point.x, doubles) + shift_x, lanes);
+  const lanes y = __builtin_convertvector(__builtin_convertvector(point.y, doubles) + shift_y, lanes);
+  const lanes z = __builtin_convertvector(__builtin_convertvector(point.z, doubles) + shift_z, lanes);
+  return chosen(is_base, point, vector{x, y, z});
 };

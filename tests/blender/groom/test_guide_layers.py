@@ -7,9 +7,9 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.data.strands import curves
+from hair_addon.blender.data.strands import attributes, curves, layer_attributes
 from hair_addon.core.errors import HairError
-from hair_addon.core.grooming import layer_kernels
+from hair_addon.core.grooming import guide_layers, layer_kernels
 from tests.support.reading import points, write_points
 
 
@@ -77,7 +77,7 @@ def test_combing_is_recorded_and_a_weight_takes_it_back(layered):
     np.testing.assert_allclose(points(bpy.data.objects["Hair"]), combed_hair, atol=1e-5)
 
 
-def test_a_stroke_composes_only_the_guides_that_it_combs(layered, monkeypatch):
+def test_a_stroke_that_its_layer_can_have_composes_no_guides(layered, monkeypatch):
     comb(layered)
     api.add_layer(layered)
     update()
@@ -93,9 +93,63 @@ def test_a_stroke_composes_only_the_guides_that_it_combs(layered, monkeypatch):
     write_points(layered, combed)
     layered.data.update_tag()
     update()
-    assert sum(counted) == 2
+    assert not counted
     assert np.array_equal(points(layered), combed)
     set_weight(layered, 1, 0.0)
+    np.testing.assert_allclose(points(layered), shape, atol=1e-6)
+
+
+def stored(guides, place):
+    """Return the attributes of a layer: turns (N, 4) and stretches (N,)."""
+    identity = guides.data.vellus.layers[place].identity
+    return [
+        attributes.read(guides.data, f"layer_{identity}_{name}", data_type, "POINT")
+        for name, data_type in (("turn", "QUATERNION"), ("stretch", "FLOAT"))
+    ]
+
+
+def test_recording_takes_what_layers_store_now_and_undo_steps_keep_theirs(layered):
+    """Recording writes to the memory of Blender's attributes; nothing else may share it, nor be remembered."""
+    comb(layered)
+    api.add_layer(layered)
+    comb(layered, (1.0, 0.0, 0.0))
+    bpy.ops.ed.undo_push(message="Combed")
+    before = [stored(layered, place) for place in (0, 1)]
+    turns = before[0][0].copy()
+    turns[:, 1:] *= -1.0
+    name = f"layer_{layered.data.vellus.layers[0].identity}_turn"
+    layered.data.attributes[name].data.foreach_set("value", turns.ravel())  # by a script, which reports nothing
+    combed = points(layered)
+    combed[:2] = leaned(combed[:2], (0.0, 0.0, 2.0))
+    write_points(layered, combed)
+    layered.data.update_tag()
+    update()
+    assert np.array_equal(points(layered), combed)
+    assert np.array_equal(stored(layered, 0)[0], turns)
+    per_guide = combed.shape[1]
+    assert not np.array_equal(stored(layered, 1)[0], before[1][0])
+    assert np.array_equal(stored(layered, 1)[0][2 * per_guide :], before[1][0][2 * per_guide :])
+    layers = layer_attributes.read(
+        layered.data, [item.identity for item in layered.data.vellus.layers], np.ones((2, len(combed)))
+    )
+    np.testing.assert_allclose(guide_layers.composed(layers)[: 2 * per_guide], combed[:2].reshape(-1, 3), atol=1e-6)
+    bpy.ops.ed.undo_push(message="Combed again")
+    bpy.ops.ed.undo()
+    guides = bpy.data.objects["Guides"]
+    for place in (0, 1):
+        assert all(map(np.array_equal, stored(guides, place), before[place]))
+
+
+@pytest.mark.parametrize("data_type", [None, "FLOAT_VECTOR"])
+def test_attributes_of_a_layer_that_are_missing_or_of_another_type_are_created(layered, data_type):
+    shape = points(layered)
+    name = f"layer_{layered.data.vellus.layers[0].identity}_turn"
+    layered.data.attributes.remove(layered.data.attributes[name])
+    if data_type:
+        layered.data.attributes.new(name, data_type, "POINT")
+    comb(layered)
+    assert stored(layered, 0)[0].any()
+    set_weight(layered, 0, 0.0)
     np.testing.assert_allclose(points(layered), shape, atol=1e-6)
 
 

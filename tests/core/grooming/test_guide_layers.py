@@ -169,6 +169,56 @@ def test_recording_with_the_known_shape_is_the_same(combed):
     assert np.array_equal(partly[~np.repeat(is_other, layers.counts)], shape[~np.repeat(is_other, layers.counts)])
 
 
+def test_layers_may_be_in_separate_memory(combed):
+    """Composing and recording are the same bit for bit; recording in place changes only the memory of its layer."""
+    layers, points = combed
+    edited = _combed(points, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
+    again, is_made = guide_layers.recorded(layers, 1, edited)
+    turns, stretches = tuple(map(np.copy, layers.turns)), tuple(map(np.copy, layers.stretches))
+    apart = replace(layers, turns=turns, stretches=stretches)
+    assert np.array_equal(guide_layers.composed(apart), guide_layers.composed(layers))
+    found, is_found = guide_layers.recorded(apart, 1, edited, in_place=True)
+    assert found.turns[1] is turns[1] and np.array_equal(is_found, is_made)
+    for layer in range(3):
+        assert np.array_equal(turns[layer], again.turns[layer])
+        assert np.array_equal(stretches[layer], again.stretches[layer])
+    with pytest.raises(HairError):
+        replace(layers, turns=(*turns[:2], turns[2][:-1]))
+
+
+def test_invalid_numbers_of_layers_count_as_zero(combed):
+    layers, points = combed
+    turns, stretches = layers.turns.copy(), layers.stretches.copy()
+    turns[0, 50:90, 1], turns[2, 300:340, 0], stretches[1, 500:510] = np.nan, np.inf, -np.inf
+    invalid = replace(layers, turns=turns, stretches=stretches)
+    valid = replace(
+        layers,
+        **{
+            name: np.nan_to_num(getattr(invalid, name), nan=0.0, posinf=0.0, neginf=0.0)
+            for name in ("turns", "stretches")
+        },
+    )
+    assert np.array_equal(guide_layers.composed(invalid), guide_layers.composed(valid))
+    edited = _combed(points, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
+    found, expected = (guide_layers.recorded(one, 1, edited)[0] for one in (invalid, valid))
+    assert np.isfinite(found.turns[1]).all() and np.array_equal(found.turns[1], expected.turns[1])
+
+
+@pytest.mark.parametrize("weight", [0.005, 0.02, 0.5, 1.0, 2.0])
+def test_recording_knows_which_guides_its_layer_reproduces(combed, weight):
+    """Recorded guides are reproduced if composing finds their points; small weights cannot turn far enough."""
+    layers, _points = combed
+    weights = np.array([1.0, weight, 0.7])[:, None] * np.ones_like(layers.weights)
+    layers = layers.weighted(weights)
+    shape = guide_layers.composed(layers)
+    edited = _combed(shape, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
+    again, is_made = guide_layers.recorded(layers, 1, edited)
+    is_edited = guide_layers.is_other(layers, edited, shape)
+    is_missed = guide_layers.is_other(again, edited, guide_layers.composed(again))
+    assert is_edited.any() and np.array_equal(is_made, is_edited & ~is_missed)
+    assert is_made.any() == (weight > 0.01) and is_missed.any() == (weight < 0.5)
+
+
 def test_guides_are_other_beyond_two_millionths_of_their_extent(combed):
     """Guides differ by more than rounding as a loop over guides finds; of some guides only these are compared."""
     layers, points = combed

@@ -22,6 +22,8 @@ LAYOUTS = {
     "FLOAT4X4": ("value", 16, np.float32),
 }
 
+_FLOAT = 4  # bytes
+
 RADIUS = 0.005  # Blender's default for Curves without radii
 
 CATMULL_ROM, POLY = 0, 1  # Blender's curve types; other types have greater numbers
@@ -37,7 +39,7 @@ def write(curves, name, data_type, domain, values):
     values = np.ascontiguousarray(values, scalar).ravel()
     if attribute is None:
         attribute = curves.attributes.new(name, data_type, domain)
-    elif _is_equal(attribute, value_name, values):
+    elif _is_at(attribute, values) or _is_equal(attribute, value_name, values):
         return
     attribute.data.foreach_set(value_name, values)
 
@@ -72,6 +74,12 @@ def unshare_positions(curves, name="position"):
 def is_from_library(curves):
     """Whether Curves are linked from another file or a library override."""
     return curves.library is not None or curves.override_library is not None
+
+
+def _is_at(attribute, values):
+    """Whether values are the attribute's own memory, from `view`."""
+    data = attribute.data
+    return bool(len(data)) and values.dtype == np.float32 and data[0].as_pointer() == values.ctypes.data
 
 
 def _is_equal(attribute, value_name, values):
@@ -116,6 +124,24 @@ def read_into(curves, name, data_type, domain, out):
     attribute = curves.attributes[name]
     if len(attribute.data):
         attribute.data.foreach_get(LAYOUTS[data_type][0], out.ravel())
+
+
+def view(curves, name, data_type, domain):
+    """Return float values like `read`, in Blender's memory, which is made unique; None as `read`.
+
+    The view is valid until the next evaluation, undo step or change of the number of values. Writing to it changes the
+    attribute.
+    """
+    if not has(curves, name, data_type, domain):
+        return None
+    data, (_value_name, width, _scalar) = curves.attributes[name].data, LAYOUTS[data_type]
+    if not len(data):
+        return read(curves, name, data_type, domain)
+    first, last = data[0].as_pointer(), data[len(data) - 1].as_pointer()
+    if last - first != _FLOAT * width * (len(data) - 1):
+        return read(curves, name, data_type, domain)  # not an array of numbers
+    values = kernels.foreign_memory.at(first, width * len(data))
+    return values if width == 1 else values.reshape(-1, width)
 
 
 def repeats(values, row):

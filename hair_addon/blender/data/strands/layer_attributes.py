@@ -21,14 +21,7 @@ def has_base(datablock):
 
 def read(datablock, identities, weights):
     """Return the `GuideLayers` of guides; identities: of the layers, weights (L, G). Missing values count as none."""
-    counts, point_count = curves.point_counts(datablock), len(datablock.points)
-
-    def values(name, data_type, domain, shape):
-        found = attributes.read(datablock, name, data_type, domain)
-        return np.zeros(shape, np.float32) if found is None else _finite(found).reshape(shape)
-
-    base = values(_BASE, "FLOAT_VECTOR", "POINT", (point_count, 3))
-    axes = (values(name, "FLOAT_VECTOR", "CURVE", (len(counts), 3)) for name in (_NORMAL, _TANGENT))
+    point_count = len(datablock.points)
     turns = np.empty((len(identities), point_count, 4), np.float32)
     stretches = np.empty((len(identities), point_count), np.float32)
     for place, identity in enumerate(identities):
@@ -39,14 +32,43 @@ def read(datablock, identities, weights):
             finite = _finite(values_of_layer)
             if finite is not values_of_layer:
                 values_of_layer[...] = finite
-    return GuideLayers(
-        base,
-        counts,
-        *axes,
-        turns,
-        stretches,
-        np.asarray(weights, np.float32).reshape(len(identities), len(counts)),
-    )
+    return _on_base(datablock, turns, stretches, weights, attributes.read)
+
+
+def opened(datablock, identities, weights, active):
+    """Return `GuideLayers` like `read`, whose base, turns and stretches are in Blender's memory, as copies take most of
+    the time of recording. They are valid until the next evaluation.
+
+    active: index of the layer that will be recorded, whose attributes are created if they are missing.
+    """
+    point_count, layers = len(datablock.points), []
+    for place, identity in enumerate(identities):
+        values = []
+        for name, data_type, shape in (
+            (_turn(identity), "QUATERNION", (point_count, 4)),
+            (_stretch(identity), "FLOAT", (point_count,)),
+        ):
+            if place == active and not attributes.has(datablock, name, data_type, "POINT"):
+                attributes.write(datablock, name, data_type, "POINT", np.zeros(shape, np.float32))
+            found = attributes.view(datablock, name, data_type, "POINT")
+            values.append(np.zeros(shape, np.float32) if found is None else found)
+        layers.append(values)
+    turns, stretches = (tuple(values[place] for values in layers) for place in (0, 1))
+    return _on_base(datablock, turns, stretches, weights, attributes.view)
+
+
+def _on_base(datablock, turns, stretches, weights, read_attribute):
+    """Return `GuideLayers` with the base and the frames of guides, from `attributes.read` or `attributes.view`."""
+    counts = curves.point_counts(datablock)
+
+    def values(name, domain, count):
+        found = read_attribute(datablock, name, "FLOAT_VECTOR", domain)
+        return np.zeros((count, 3), np.float32) if found is None else _finite(found)
+
+    base = values(_BASE, "POINT", len(datablock.points))
+    axes = (values(name, "CURVE", len(counts)) for name in (_NORMAL, _TANGENT))
+    weights = np.asarray(weights, np.float32).reshape(len(turns), len(counts))
+    return GuideLayers(base, counts, *axes, turns, stretches, weights)
 
 
 def _finite(values):
