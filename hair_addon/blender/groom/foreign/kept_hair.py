@@ -16,7 +16,7 @@ from ....core import geometry, grooming
 from ....core.errors import HairError
 from ....core.geometry import strands
 from ....core.grooming import groom, groom_defaults
-from ....core.grooming.derived_guides import DerivationSettings
+from ....core.grooming.derived_guides import DerivationSettings, DerivedGuides
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
@@ -86,37 +86,10 @@ def using_as_hair(
     def compute(progress):
         progress("Rooting strands", 0.0)
         placed = hand_made_guides.on_surface(surface, seen, to_surface, is_directed=is_directed)
-        count = len(placed.counts)
-        if given is not None:
-            guides = hand_made_guides.on_surface(surface, *given)
-            wanted = groom_defaults.complete(
-                HairSettings(strand_count=count), surface.posed_mesh, None, None, len(guides.counts)
-            )
-            derived = grooming.derived_guides.reproduced(
-                surface.mesh,
-                placed.even(surface),
-                placed.rooted.roots,
-                wanted,
-                strands.from_numpy(guides.even(surface), guides.rooted.roots),
-                is_mirrored=surface.has_flipped_winding,
-                progress=part_of(progress, 0.1, 1.0),
-            )
-            return placed, wanted, derived, guides
-        wanted = groom_defaults.complete(
-            HairSettings(strand_count=count), surface.posed_mesh, None, None, min(settings.guide_count, count)
-        )
-        derived = grooming.derived_guides.derive(
-            surface.mesh,
-            placed.even(surface),
-            placed.rooted.roots,
-            wanted,
-            settings.guide_count,
-            is_mirrored=surface.has_flipped_winding,
-            progress=part_of(progress, 0.1, 1.0),
-        )
-        return placed, wanted, derived, None
+        guides = None if given is None else hand_made_guides.on_surface(surface, *given)
+        return placed, guides, *_reproduced(surface, placed, guides, settings, part_of(progress, 0.1, 1.0))
 
-    placed, wanted, derived, kept_guides = yield compute
+    placed, kept_guides, wanted, derived = yield compute
     hair = hand_made_guides.write(
         place.find(), its_surface.find(), surface, placed, seen, applies_modifiers, kind="HAIR"
     )
@@ -132,6 +105,25 @@ def using_as_hair(
     if follows_guides:
         pipeline.interpolate_hair(guides, wanted, depsgraph, hair)
     return KeptHair(hair, guides, placed.rooted, derived.mean_error, derived.high_error)
+
+
+def _reproduced(
+    surface: Surface, placed: PlacedCurves, guides: PlacedCurves | None, settings: DerivationSettings, progress
+) -> tuple[HairSettings, DerivedGuides]:
+    """Return settings of the hair, and the `DerivedGuides` that reproduce it; guides: that came with it, or None."""
+    count = len(placed.counts)
+    guide_count = min(settings.guide_count, count) if guides is None else len(guides.counts)
+    wanted = groom_defaults.complete(HairSettings(strand_count=count), surface.posed_mesh, None, None, guide_count)
+    points, roots = placed.even(surface), placed.rooted.roots
+    is_mirrored = surface.has_flipped_winding
+    if guides is None:
+        return wanted, grooming.derived_guides.derive(
+            surface.mesh, points, roots, wanted, settings.guide_count, is_mirrored=is_mirrored, progress=progress
+        )
+    present = strands.from_numpy(guides.even(surface), guides.rooted.roots)
+    return wanted, grooming.derived_guides.reproduced(
+        surface.mesh, points, roots, wanted, present, is_mirrored=is_mirrored, progress=progress
+    )
 
 
 def _given_guides(guides_object, surface_object):
