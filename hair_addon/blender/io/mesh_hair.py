@@ -80,42 +80,47 @@ def using_mesh(
     name = name_of(mesh_object)
     place, its_surface = Remembered(mesh_object), Remembered(surface_object)
 
-    def compute(progress):
-        alpha_at = pieces.alphas if settings.uses_alpha and pieces.has_alpha else None
-        reading = part_of(progress, 0.0, 0.5)
-        found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, reading, alpha_at)
-        if alpha_at is not None:
-            found = mesh_strands.shown(found, alpha_at(found.places), alpha_at, mesh)
-        colored = pieces.colors(found.places)
-        means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
-        if settings.reaches_surface:
-            found = mesh_strands.on_surface(found, surface)
-        return found, None if means is None else maps.pixels.unpremultiplied(means)[0]
-
-    found, colors = yield compute
-    surface_object = its_surface.find()
-    curves = CurveSet(
-        f"{name} Hair",
-        found.points,
-        found.counts,
-        np.zeros(len(found.counts), bool),
-        found.radii if settings.fills else None,
-    )
-    made = curve_objects.new_object(curves.name, curves, surface_object)
+    found, colors = yield lambda progress: _strands_of(mesh, surface, pieces, settings, progress)
+    made = _new_curves(f"{name} Hair", found, settings, its_surface.find())
     if colors is not None:
         rows = np.concatenate([colors, np.ones((len(colors), 1))], axis=1)
         attributes.write(made.data, COLOR, "FLOAT_COLOR", "CURVE", rows)
     kept = yield from kept_hair.using_as_hair(
-        made, surface_object, scene.present_depsgraph(), derivation, is_directed=True
+        made, its_surface.find(), scene.present_depsgraph(), derivation, is_directed=True
     )
     if colors is not None:
-        color = tuple(np.clip(colors.mean(axis=0), 0.0, 1.0).tolist())
-        own = properties.own_look_of(kept.hair.vellus)
-        looks.apply_look(kept.hair, replace(own, parametrization="COLOR", color=color))
-        map_items.keep(kept.hair.vellus, MapSettings(setting="look.color", kind="CURVES", source=COLOR))
+        _show_colors(kept.hair, colors)
     if hides_mesh:
         made_meshes.hide(place.find())
     return MeshHair(kept, found.piece_count, found.skipped_count)
+
+
+def _strands_of(mesh, surface, pieces, settings, progress):
+    """Return the `MeshStrands` of a mesh in the world, and their linear colors (S, 3), None without colors."""
+    alpha_at = pieces.alphas if settings.uses_alpha and pieces.has_alpha else None
+    reading = part_of(progress, 0.0, 0.5)
+    found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, reading, alpha_at)
+    if alpha_at is not None:
+        found = mesh_strands.shown(found, alpha_at(found.places), alpha_at, mesh)
+    colored = pieces.colors(found.places)
+    means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
+    if settings.reaches_surface:
+        found = mesh_strands.on_surface(found, surface)
+    return found, None if means is None else maps.pixels.unpremultiplied(means)[0]
+
+
+def _new_curves(name, found, settings, surface_object):
+    """Return a new object with the curves of `MeshStrands`."""
+    are_smooth, radii = np.zeros(len(found.counts), bool), found.radii if settings.fills else None
+    return curve_objects.new_object(name, CurveSet(name, found.points, found.counts, are_smooth, radii), surface_object)
+
+
+def _show_colors(hair, colors):
+    """Give hair the mean of the colors (S, 3) of its strands, and a map of them."""
+    color = tuple(np.clip(colors.mean(axis=0), 0.0, 1.0).tolist())
+    own = properties.own_look_of(hair.vellus)
+    looks.apply_look(hair, replace(own, parametrization="COLOR", color=color))
+    map_items.keep(hair.vellus, MapSettings(setting="look.color", kind="CURVES", source=COLOR))
 
 
 def _require_usable(mesh_object, surface_object):
