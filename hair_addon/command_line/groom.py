@@ -52,7 +52,22 @@ def run(given, console):
     if given.preset:
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
         settings = options.changed_groom(replace(settings, appearance=look), given)
+    _require_usable(given)
+    file_axes = opening.open_file(given, console)
+    surface = blender.io.mesh_files.find_surface(given.surface)
+    settings = map_options.mapped(given, _styled(given, settings, surface))
+    started = time.perf_counter()
+    systems = _systems(given, surface, settings, file_axes, console)
+    guides, hair = systems[0]
+    _warn_of_styles(given, hair, console)
+    seconds = time.perf_counter() - started
+    console.progress("Writing", 1.0)
+    blender.io.groom_files.write(given.out, guides, hair, file_axes)
+    _report(given, surface, systems, seconds, console)
 
+
+def _require_usable(given):
+    """Raise `HairError` for contradicting options, files that cannot be read, and files that cannot be written."""
     came_from = curve_options.checked(given)
     if given.from_library and (came_from or given.from_mesh or given.from_particles or given.settings):
         raise HairError(
@@ -63,29 +78,27 @@ def run(given, console):
         blender.io.curve_files.require_readable(came_from)
     blender.io.mesh_files.require_readable(given.input)
     blender.io.groom_files.require_writable(given.out)
-    file_axes = opening.open_file(given, console)
-    surface = blender.io.mesh_files.find_surface(given.surface)
-    settings = map_options.mapped(given, _styled(given, settings, surface))
-    started = time.perf_counter()
+
+
+def _systems(given, surface, settings, file_axes, console):
+    """Return [(guides, hair)] of all hair systems that the options ask for."""
     if given.from_library:
-        systems = [_from_library(given, surface, console)]
-    elif given.from_mesh:
-        systems = [_of_mesh(given, surface, settings, console)]
-    elif given.from_particles:
+        return [_from_library(given, surface, console)]
+    if given.from_mesh:
+        return [_of_mesh(given, surface, settings, console)]
+    if given.from_particles:
         with blender.groom.foreign.particle_hair.as_curves(surface) as made:
             use = _follow_curves if given.from_particles == "GUIDES" else _keep_curves
-            systems = [use(given, surface, settings, blender.io.curve_files.Found(made), console)]
-    elif came_from:
+            return [use(given, surface, settings, blender.io.curve_files.Found(made), console)]
+    if given.guides_from or given.hair_from:
         use = _follow_curves if given.guides_from else _keep_curves
         with _curves_of("GUIDES" if given.guides_from else "HAIR", given, surface, file_axes, console) as groups:
-            systems = [use(given, surface, settings, found, console) for found in groups]
-    else:
-        systems = [_grow(surface, settings, console)]
-    guides, hair = systems[0]
-    _warn_of_styles(given, hair, console)
-    seconds = time.perf_counter() - started
-    console.progress("Writing", 1.0)
-    blender.io.groom_files.write(given.out, guides, hair, file_axes)
+            return [use(given, surface, settings, found, console) for found in groups]
+    return [_grow(surface, settings, console)]
+
+
+def _report(given, surface, systems, seconds, console):
+    """Print the numbers of guides, strands and points that were written."""
     counts = {
         "guides": sum(len(one.curves) for one, _ in systems),
         "strands": sum(len(one.curves) for _, one in systems),
