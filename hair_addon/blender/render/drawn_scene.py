@@ -177,17 +177,7 @@ def read(
         return _EMPTY
     is_shaded, grown_on = viewport is None or not is_hair_only, _surface_uids(places)
     if before is None or before.shadow_maps is None:
-        has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
-        if not has_normals and not shown.is_wire:
-            has_normals = grown_on
-        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
-        if is_shaded:
-            meshes = drawn_meshes.split_clear(meshes)
-        has_paths = viewport is None or shown.light.kind == viewport_shading.SCENE
-        surroundings = _upload(meshes, is_shaded, has_paths)
-        if shown.light.kind != viewport_shading.SCENE:
-            below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
-            surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
+        surroundings = _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, former is not None)
         world, lamps, maps = _world_of(shown.light, blender_scene, view_layer, viewport is None), None, None
     else:
         surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
@@ -207,30 +197,42 @@ def read(
     is_draft = is_draft or (former is not None and are_made)
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
-    renewal = None
     drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, is_wire=shown.is_wire, **surroundings)
     if shown.light.kind != viewport_shading.SCENE:
         drawn = replace(drawn, is_shadowed=tuple(owner[0] in grown_on for owner in drawn.surface_owners))
-    if is_draft and last is not None and _have_same_places(last, drawn):
-        seen = last.hair_visibility, last.surface_visibility
-        if are_made:
-            renewal = last.renewal or ambient_visibility.Renewal()
-            seen = _renewed(renewal, seen, drawn)
-    else:
-        seen = visibility(drawn)
-    owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
+    (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
     drawn = replace(
         drawn,
-        hair_visibility=seen[0],
-        surface_visibility=seen[1],
-        owners=owners,
+        hair_visibility=hair_seen,
+        surface_visibility=surfaces_seen,
+        owners=tuple(place.owner for place in places),
         hair_owners=hair_owners,
-        selected=selected,
+        selected=tuple(place.is_selected for place in places),
         instances=instances,
         renewal=renewal,
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+
+
+def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_played):
+    """Return `_SURROUNDINGS` of a scene: its meshes on the GPU.
+
+    is_shaded: whether Vellus shades surfaces; grown_on: of `_surface_uids`; is_played: during playback; others: of
+    `read`.
+    """
+    has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
+    if not has_normals and not shown.is_wire:
+        has_normals = grown_on
+    meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_played, has_normals)
+    if is_shaded:
+        meshes = drawn_meshes.split_clear(meshes)
+    is_lit_by_scene = shown.light.kind == viewport_shading.SCENE
+    surroundings = _upload(meshes, is_shaded, has_paths=viewport is None or is_lit_by_scene)
+    if not is_lit_by_scene:
+        below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
+        surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
+    return surroundings
 
 
 def _surface_uids(places):
@@ -457,6 +459,20 @@ def visibility(drawn):
     opacities = [shading.opacity for _, shading, *_ in drawn.hair]
     forwards = [shading.forward for _, shading, *_ in drawn.hair]
     return ambient_visibility.measure(_placed(drawn.hair), _blocking(drawn), opacities, _receiving(drawn), forwards)
+
+
+def _visibility_since(last, drawn, are_made):
+    """Return (`visibility`, the `Renewal` that updates it or None) of a `DrawnScene` after another; None: of a new one.
+
+    are_made: whether a GPU makes or carries hair, whose visibility changes by one step; other visibility is kept.
+    """
+    if last is None or not _have_same_places(last, drawn):
+        return visibility(drawn), None
+    seen = last.hair_visibility, last.surface_visibility
+    if not are_made:
+        return seen, None
+    renewal = last.renewal or ambient_visibility.Renewal()
+    return _renewed(renewal, seen, drawn), renewal
 
 
 def _renewed(renewal, seen, drawn):
