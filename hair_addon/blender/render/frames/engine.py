@@ -92,25 +92,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     @memory_as_sentence()
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
-        _require_supported(self.camera_override)
-        if self.is_animation or composite.is_in_sequence(blender_scene):
-            frame_folders.require_baked([scene_time.frame_of(blender_scene)], blender_scene)
-        frame_folders.require_readable([scene_time.frame_of(blender_scene)], blender_scene)
-        if _listener is no_progress:  # `io.pictures.frames` checks by itself
-            self._check_files(blender_scene)
+        self._require_renderable(blender_scene)
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
-        sample_count = view_layer.samples or blender_scene.vellus.sample_count
         wanted = _passes(view_layer, blender_scene.render.use_motion_blur)
         passes = [name for name in wanted if not mattes.is_matte(name)]
         labels = mattes.Labels(view_layer.pass_cryptomatte_depth) if len(passes) < len(wanted) else None
-        filter_width = pixel_sampling.FILTER_WINDOW * blender_scene.render.filter_size
-        film_settings = passes, blender_scene.render.film_transparent, filter_width
-        has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
-        lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
-        path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
-        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count, labels, len(offsets)
+        film_settings = self._film_settings(depsgraph, size, passes, labels, len(offsets))
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
         progress = FrameProgress(self, frame_progress.share_of(depsgraph), _listener)
         before = _NEIGHBOURS if "Vector" in passes else 0.0
@@ -126,15 +115,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 reading, callbacks = part_of(progress, begun, drawn_from), (refused.__setitem__, noted.__setitem__)
                 drawn = drawn_scene.read_render(depsgraph, known, *callbacks, reading)
             for number, (view, frame) in enumerate(frames.items()):
-                with drawing.ALONE:
-                    camera = self._camera(depsgraph, view, size)
-                    lens = cameras.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
-                    moving = None
-                    if others:
-                        now, around = motion_vectors.places(drawn, *camera), others[view]
-                        moving = motion_vectors.Motion(around[0], now, around[1], size)
                 first, last = (drawn_from + (end - drawn_from) * (number + n) / len(frames) for n in (0, 1))
-                frame.expose(drawn, *camera, moving, lens, part_of(progress, first, last))
+                self._expose(frame, drawn, depsgraph, view, size, others.get(view), part_of(progress, first, last))
                 is_last = index + 1 == len(offsets)
                 if is_last or not bpy.app.background:
                     arrays = frame.arrays()
@@ -150,6 +132,38 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             composite.refuse(blender_scene, error_text(note))
             if not bpy.app.background:  # already printed to the console
                 self.report({"WARNING"}, error_text(note))
+
+    def _require_renderable(self, blender_scene):
+        """Raise `HairError` for an unsupported camera, frames that are not baked, and missing or damaged files."""
+        _require_supported(self.camera_override)
+        frames = [scene_time.frame_of(blender_scene)]
+        if self.is_animation or composite.is_in_sequence(blender_scene):
+            frame_folders.require_baked(frames, blender_scene)
+        frame_folders.require_readable(frames, blender_scene)
+        if _listener is no_progress:  # `io.pictures.frames` checks by itself
+            self._check_files(blender_scene)
+
+    def _film_settings(self, depsgraph, size, passes, labels, step_count):
+        """Return the arguments of a `Frame` after its window; samples and paths are shared by the motion steps."""
+        blender_scene = depsgraph.scene
+        sample_count = depsgraph.view_layer.samples or blender_scene.vellus.sample_count
+        filter_width = pixel_sampling.FILTER_WINDOW * blender_scene.render.filter_size
+        has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
+        lens_passes = -(-pixel_sampling.LENS_PASSES // step_count) if has_lens else 1
+        path_count = -(-light_paths.path_count(blender_scene, size) // step_count)
+        is_transparent = blender_scene.render.film_transparent
+        of_step = -(-sample_count // step_count)
+        return of_step, passes, is_transparent, filter_width, lens_passes, path_count, labels, step_count
+
+    def _expose(self, frame, drawn, depsgraph, view, size, around, progress):
+        """Draw a motion step of a view; around: [`Places`] one frame before and after, None without a motion pass."""
+        with drawing.ALONE:
+            camera = self._camera(depsgraph, view, size)
+            lens = cameras.read_lens(depsgraph.scene, depsgraph, self._camera_object(depsgraph, view))
+            moving = None
+            if around is not None:
+                moving = motion_vectors.Motion(around[0], motion_vectors.places(drawn, *camera), around[1], size)
+        frame.expose(drawn, *camera, moving, lens, progress)
 
     def _check_files(self, blender_scene):
         """Raise `HairError` if files are missing or damaged, in the background; in a window, show a warning."""
