@@ -7,7 +7,7 @@ from ...groom.selection import mesh_to_attach_to, parts_of, surface_of
 from ...groom.surfaces import attached_hair
 from ...groom.systems import edits
 from ...live import reported
-from .base.hair_operator import HairOperator
+from .base.hair_operator import HairOperator, needs_surface
 
 
 class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):
@@ -31,11 +31,7 @@ class VELLUS_OT_make_uv_map(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.make_uv_map"
     bl_label = "Make UV Map"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
-        return context.mode == "OBJECT" and surface_of(context.object) is not None
+    applies = needs_surface
 
     def change(self, context):
         edits.make_uv_map(surface_of(context.object), context.view_layer)
@@ -77,11 +73,7 @@ class VELLUS_OT_apply_scale(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.apply_scale"
     bl_label = "Apply Scale"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
-        return context.mode == "OBJECT" and surface_of(context.object) is not None
+    applies = needs_surface
 
     def change(self, context):
         edits.apply_scale(surface_of(context.object), context.view_layer)
@@ -92,11 +84,7 @@ class VELLUS_OT_flip_normals(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.flip_normals"
     bl_label = "Flip Normals"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
-        return context.mode == "OBJECT" and surface_of(context.object) is not None
+    applies = needs_surface
 
     def change(self, context):
         edits.flip_normals(surface_of(context.object), context.view_layer)

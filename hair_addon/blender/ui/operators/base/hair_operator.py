@@ -3,7 +3,7 @@
 
 from .....core.errors import HairError, memory_as_sentence
 from ....data import whole_changes
-from ....groom.selection import guides_of, hair_of
+from ....groom.selection import guides_of, hair_of, surface_of
 from ....settings.translations import CONTEXT, error_text, report_text
 
 
@@ -26,6 +26,13 @@ def needs_hair_or_guides(cls, context):
     """`applies` of operators on settings of the active hair or of its guides."""
     cls.poll_message_set("Select hair or guides.")
     return hair_of(context.object) is not None or guides_of(context.object) is not None
+
+
+@classmethod
+def needs_surface(cls, context):
+    """`applies` of operators on a surface in Object Mode: the active mesh, or that of the active hair."""
+    cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
+    return context.mode == "OBJECT" and surface_of(context.object) is not None
 
 
 class HairOperator:
