@@ -29,15 +29,6 @@ def update():
     bpy.context.view_layer.update()
 
 
-@pytest.fixture
-def window(monkeypatch):
-    """Act as in a window, where the picture is ahead of the Curves until `write_all`."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
-
-
 DEFORMERS = {
     "subdivision": lambda sphere: sphere.modifiers.new("Subdivision", "SUBSURF"),
     "simple deform": lambda sphere: setattr(sphere.modifiers.new("Bend", "SIMPLE_DEFORM"), "angle", 1.0),
@@ -59,7 +50,7 @@ def drawn(hair):
 
 
 @pytest.mark.parametrize(("deformer", "strand_count"), pairs(DEFORMERS, [40_000, 20], 4))
-def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, strand_count):
+def test_another_strand_count_on_a_deformed_surface(sphere, in_window, deformer, strand_count):
     """With another strand count on a deformed surface, the picture shows the strands to be written, at their own
     roots.
     """
@@ -80,7 +71,7 @@ def test_another_strand_count_on_a_deformed_surface(sphere, window, deformer, st
     assert_follows(hair)
 
 
-def test_a_picture_between_writing_and_blenders_report(sphere, window):
+def test_a_picture_between_writing_and_blenders_report(sphere, in_window):
     """A picture between writing and Blender's report, as a script may draw it, shows the written strands."""
     DEFORMERS["simple deform"](sphere)
     bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, length=0.4)

@@ -16,6 +16,7 @@ import tests.support.examples  # noqa: F401 (for what it sets)
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
+from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.core.grooming.groom import GuideSettings
 from hair_addon.core.imaging import ambient_cube
 from tests.support import remembered
@@ -291,6 +292,15 @@ def waved(hair):
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     bpy.ops.ed.undo_push(message="combed")
     return bpy.data.objects["Hair"]
+
+
+@pytest.fixture
+def in_window(monkeypatch):
+    """Act as in a window, where the picture is ahead of the Curves until `live_hair.write_all`."""
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    yield
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
 
 
 @pytest.fixture

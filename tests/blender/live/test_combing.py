@@ -11,8 +11,7 @@ import pytest
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.groom import bindings, pipeline
-from hair_addon.blender.host import running
-from hair_addon.blender.live import handlers, invalidation, live_hair
+from hair_addon.blender.live import handlers, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
 from hair_addon.core.interpolation.guide_weights import reach
@@ -21,15 +20,6 @@ from tests.support.pictures import drawn_strands
 from tests.support.reading import attribute, points, write_points
 
 pytestmark = pytest.mark.usefixtures("made_anew")
-
-
-@pytest.fixture
-def window(monkeypatch):
-    """Act as in a window, where hair is written when an interaction ends; the test ends it by `write_all`."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
 
 
 def drawn(hair):
@@ -52,7 +42,7 @@ def grown_from_nothing(hair):
     return pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph).points
 
 
-def test_a_stroke_searches_nothing_and_writes_once(hair, window, monkeypatch):
+def test_a_stroke_searches_nothing_and_writes_once(hair, in_window, monkeypatch):
     guides = bpy.data.objects["Guides"]
     drawn(hair)
     calls = counts_of(monkeypatch)
@@ -80,7 +70,7 @@ def grown(hair):
     ).numpy()
 
 
-def test_a_redraw_waits_for_strands_that_grow(hair, window, monkeypatch):
+def test_a_redraw_waits_for_strands_that_grow(hair, in_window, monkeypatch):
     """A redraw waits while strands grow in other threads."""
     go_on, strands_now = threading.Event(), following.strands_now
     drawn(hair)
@@ -97,7 +87,7 @@ def test_a_redraw_waits_for_strands_that_grow(hair, window, monkeypatch):
         np.testing.assert_allclose(shown, grown(hair), atol=2e-6)
 
 
-def test_only_strands_of_moved_guides_are_uploaded(hair, window, monkeypatch):
+def test_only_strands_of_moved_guides_are_uploaded(hair, in_window, monkeypatch):
     guides = bpy.data.objects["Guides"]
     drawn(hair)
     moved, real = [], strand_textures.move_strands
@@ -132,7 +122,7 @@ def test_without_a_window_hair_is_written_at_once(hair, monkeypatch):
     assert np.array_equal(points(hair), grown_from_nothing(hair))
 
 
-def test_a_pause_writes_unless_the_stroke_goes_on(hair, window, monkeypatch):
+def test_a_pause_writes_unless_the_stroke_goes_on(hair, in_window, monkeypatch):
     guides = bpy.data.objects["Guides"]
     before = points(hair)
     list(stroke(guides, [3], steps=1))
@@ -147,7 +137,7 @@ def test_a_pause_writes_unless_the_stroke_goes_on(hair, window, monkeypatch):
 
 
 @pytest.mark.parametrize("reader", ["save", "render", "unregister"])
-def test_hair_is_written_before_it_is_read(hair, window, reader, tmp_path):
+def test_hair_is_written_before_it_is_read(hair, in_window, reader, tmp_path):
     guides = bpy.data.objects["Guides"]
     list(stroke(guides, [3], steps=1))
     wanted = drawn(hair)
@@ -174,7 +164,9 @@ _SLIDERS = {
 
 
 @pytest.mark.parametrize(("name", "values"), _SLIDERS.items())
-def test_sliders_that_keep_roots_search_nothing_and_write_when_they_are_let_go(hair, window, monkeypatch, name, values):
+def test_sliders_that_keep_roots_search_nothing_and_write_when_they_are_let_go(
+    hair, in_window, monkeypatch, name, values
+):
     list(stroke(bpy.data.objects["Guides"], range(0, 60, 2), steps=2))  # guides that differ
     settings = hair.data.vellus.hair
     settings.automatic_influence = name != "influence_distance"
@@ -198,7 +190,7 @@ def test_sliders_that_keep_roots_search_nothing_and_write_when_they_are_let_go(h
     assert np.array_equal(points(hair), grown_from_nothing(hair))
 
 
-def test_more_guides_for_a_strand_are_searched_for(hair, window, monkeypatch):
+def test_more_guides_for_a_strand_are_searched_for(hair, in_window, monkeypatch):
     calls = counts_of(monkeypatch)
     hair.data.vellus.hair.neighbour_limit = 12
     bpy.context.view_layer.update()
@@ -275,7 +267,7 @@ def test_hair_that_was_sculpted_itself_is_kept(hair):
 
 
 @pytest.mark.parametrize("is_written_before_undo_push", [True, False])
-def test_undo_and_redo_keep_hair_and_guides_together(hair, window, is_written_before_undo_push):
+def test_undo_and_redo_keep_hair_and_guides_together(hair, in_window, is_written_before_undo_push):
     """Undo and redo keep hair and guides together, whether a stroke's undo step is pushed before or after the hair
     is written.
     """
@@ -299,7 +291,7 @@ def test_undo_and_redo_keep_hair_and_guides_together(hair, window, is_written_be
     assert np.array_equal(drawn(bpy.data.objects["Hair"]), wanted)
 
 
-def test_a_stroke_on_one_groom_leaves_another_alone(hair, sphere, window, monkeypatch):
+def test_a_stroke_on_one_groom_leaves_another_alone(hair, sphere, in_window, monkeypatch):
     bpy.context.view_layer.objects.active = sphere
     bpy.ops.vellus.distribute_guides(guide_count=30, length=0.2)
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides.001"]
@@ -325,7 +317,7 @@ def test_a_guide_that_a_brush_added_is_rooted(hair, sphere):
     assert np.array_equal(points(hair), grown_from_nothing(hair))
 
 
-def test_changes_before_a_pending_write_are_evaluated(hair, sphere, window):
+def test_changes_before_a_pending_write_are_evaluated(hair, sphere, in_window):
     for size in (1.1, 1.3):
         sphere.data.transform(((size, 0, 0, 0), (0, size, 0, 0), (0, 0, size, 0), (0, 0, 0, 1)))
         sphere.data.update()
@@ -335,7 +327,7 @@ def test_changes_before_a_pending_write_are_evaluated(hair, sphere, window):
     assert drawn_strands.are_drawn(drawn(hair), points(hair))
 
 
-def test_a_file_saved_in_the_middle_of_a_stroke_gets_its_hair(hair, window, tmp_path, monkeypatch):
+def test_a_file_saved_in_the_middle_of_a_stroke_gets_its_hair(hair, in_window, tmp_path, monkeypatch):
     list(stroke(bpy.data.objects["Guides"], [3]))
     wanted = drawn(hair)
     monkeypatch.setattr(live_hair, "write_all", lambda: None)  # as an automatic save does

@@ -7,24 +7,14 @@ import pytest
 
 from hair_addon.blender.data.maps import strand_maps
 from hair_addon.blender.data.strands import attributes
-from hair_addon.blender.host import running
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import map_items
 from hair_addon.core.maps.map_settings import MapSettings
 
 
 @pytest.fixture
-def window(monkeypatch):
-    """Act as in a window, where hair is written when an interaction ends; the test ends it by `write_all`."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
-
-
-@pytest.fixture
-def coat(hair, window):
+def coat(hair, in_window):
     """Return an image of one color that gives the color to the hair, which is drawn."""
     image = bpy.data.images.new("Coat", 32, 32, alpha=True)
     hair.data.vellus.appearance.parametrization = "COLOR"

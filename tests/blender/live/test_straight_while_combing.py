@@ -7,8 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.groom import pipeline
-from hair_addon.blender.host import running
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import clump, curl, lean, steps
@@ -18,16 +17,7 @@ from tests.support.reading import points, write_points
 
 
 @pytest.fixture
-def window(monkeypatch):
-    """Act as in a window."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
-
-
-@pytest.fixture
-def combed(hair, window):
+def combed(hair, in_window):
     """Return curly hair in locks with guides in Sculpt Mode, to be shown straight."""
     hair.data.vellus.hair.point_count = 60
     for settings in (lean.Settings(amount=0.3), clump.Settings(size=0.2), curl.Settings(radius=0.02, pitch=0.1)):

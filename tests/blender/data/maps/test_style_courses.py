@@ -20,14 +20,6 @@ RADIUS = "styles.Curl.radius"
 FALLING = "0:1 0.5:1 1:0.2"
 
 
-@pytest.fixture
-def curls(hair):
-    """Return hair Curves with the style Curl."""
-    api.add_style(hair.data, "CURL", radius=0.05, pitch=0.2)
-    bpy.context.view_layer.update()
-    return hair.data
-
-
 def points(curves_data):
     """Return (S, P, 3) float32, the points that hair Curves store after an update."""
     bpy.context.view_layer.update()
