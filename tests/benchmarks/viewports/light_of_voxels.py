@@ -7,7 +7,7 @@ Prints the error of means of 12 × 12 pixels in display levels of 255, the struc
 colors, and the time of the light. A variant is PATHS:PRIOR:VOXELS[:SEED]: factors of the number of paths, the weight of
 larger voxels in paths (0: by the number of paths), a factor of the number of voxels, and the random seed of the paths;
 "live" is the light of a viewport after one second at rest, "voxels" the same without sample points along strands.
-Cycles' pictures are the means of two halves, whose difference is its own noise.
+Cycles' pictures are the means of two halves, whose difference is its own noise; errors are also estimated without it.
 
 With --references, many processes share Cycles' work: some with --references-only, each on one thread, render halves
 that no other process has begun, and one process draws all scenes meanwhile, then compares them with the halves.
@@ -147,24 +147,23 @@ def compare(seed, halves, rows, pictures):
             measure(reference, picture) for measure in (picture_pairs.block_error, picture_pairs.structure)
         )
         deviation = picture_pairs.deviation(reference, picture)
-        # The mean of both halves has half of the noise of their difference.
-        known = np.sqrt(max(blocks**2 - 0.25 * noise[0] ** 2, 0.0))
-        rows[variant].append((blocks, structure, seconds, deviation, known))
+        noiseless = picture_pairs.noiseless_block_error(halves, picture)
+        rows[variant].append((blocks, structure, seconds, deviation, noiseless))
         ratio = " ".join(f"{value:.3f}" for value in picture_pairs.ratio(reference, picture))
         say(
-            f"{seed} {variant:9} blocks {blocks:5.2f}  structure {structure:.3f}  ratio {ratio}  {seconds:.2f} s  "
-            f"{taken:.0f} paths, relative variance {variance:.1f}"
+            f"{seed} {variant:9} blocks {blocks:5.2f}, noiseless {noiseless:5.2f}  structure {structure:.3f}  "
+            f"ratio {ratio}  {seconds:.2f} s  {taken:.0f} paths, relative variance {variance:.1f}"
         )
 
 
 def report(rows):
     """Print the distribution of the figures of each variant."""
     for variant, found in rows.items():
-        blocks, structures, seconds, deviations, known = np.array(found or [(np.nan,) * 5]).T
+        blocks, structures, seconds, deviations, noiseless = np.array(found or [(np.nan,) * 5]).T
         say(
             f"{variant:9} {len(found)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, within 15 % "
             f"{np.mean(deviations < 0.15):.0%}, median {np.median(deviations):.1%}, worst {deviations.max():.1%}; "
-            f"blocks mean {blocks.mean():.2f} ({known.mean():.2f} without Cycles' noise), worst {blocks.max():.2f}; "
+            f"blocks mean {blocks.mean():.2f}, worst {blocks.max():.2f}, noiseless {noiseless.mean():.2f}; "
             f"structure mean {structures.mean():.3f}, worst {structures.min():.3f}; light {np.median(seconds):.2f} s"
         )
 
