@@ -16,7 +16,7 @@ from .. import geometry, interpolation, kernels
 from ..errors import HairError
 from ..geometry.strands import Strands
 from ..interpolation.hair_binding import HairBinding
-from ..kernels.checks import require_count, require_indices
+from ..kernels.checks import require_count
 
 if TYPE_CHECKING:
     import warp as wp
@@ -155,7 +155,7 @@ def follow_some(
     if styling is not None:
         styling.apply(sums[0], list(zip(sums[1:], read, strict=True)), chosen)
     points = sums[0].numpy()
-    return geometry.transform.transformed(points, axes, points), weights[: len(chosen)]
+    return geometry.transform.transformed(points, axes, points), weights[0].numpy()
 
 
 def weights_now(binding: HairBinding, guides: Strands) -> "GuideWeights":
@@ -175,62 +175,31 @@ def _require_guides(binding, guides):
 
 
 def _sums_of_some(parts, guides):
-    """Compute weighted sums for some strands of several bindings to the same guides and settings in one pass.
+    """Compute weighted sums for some strands of several bindings to the same guides and settings.
 
-    parts: pairs of a binding and (M,) indices of its strands. Returns a list of (M, P) vec3, one for each part, and
-    the guide weights of all strands, float32.
+    parts: pairs of a binding and (M,) indices of its strands. Returns lists of the strands (M, P) vec3, and of the
+    guide weights (M, k) of each part.
     """
-    import warp as wp
-
-    binding, rows_here = parts[0][0], interpolation.guide_weights.rows_here
+    binding = parts[0][0]
     device = binding.positions.device
     _require_guides(binding, guides)
-    for own, chosen in parts:
-        require_indices("strands", chosen, len(own.positions))
+    guide_points, sums, of_all = guides.points.to(device), [], []
+    for own, strands in parts:
         require_count("guides", own.guide_weights.guide_count, len(guides))
-
-    def joined(array_of, kind):
-        rows = [rows_here(array_of(own), chosen) for own, chosen in parts]
-        return wp.array(np.concatenate(rows), dtype=kind, device=device, copy=False)
-
-    # Few strands need only some of the guides.
-    indices = np.concatenate([rows_here(own.guide_weights.indices, chosen) for own, chosen in parts])
-    is_followed = np.zeros(len(guides) + 1, bool)
-    is_followed[indices] = True
-    is_followed[-1] = False  # index -1 stands for no guide
-    followed, places = np.flatnonzero(is_followed), (np.cumsum(is_followed) - 1)[indices]
-    places[indices < 0] = -1
-    guide_points, guide_normals = (
-        wp.array(rows_here(array, followed), dtype=wp.vec3, device=device, copy=False)
-        for array in (guides.points, binding.guide_normals)
-    )
-    weights = interpolation.guide_weights.limited(
-        interpolation.guide_weights.GuideWeights(
-            wp.array(places, dtype=int, device=device),
-            joined(lambda own: own.guide_weights.weights, float),
-            joined(lambda own: own.guide_weights.turns, wp.vec2),
-            len(followed),
-        ),
-        guide_points,
-        guide_normals,
-        binding.limits,
-    )
-    points = interpolation.interpolation.interpolate(
-        joined(lambda own: own.positions, wp.vec3),
-        joined(lambda own: own.normals, wp.vec3),
-        guide_points,
-        guide_normals,
-        weights,
-        binding.keep_length,
-    )
-    ends = np.cumsum([len(chosen) for _own, chosen in parts]).tolist()
-    sums = [_rows_between(points, end - len(chosen), end) for end, (_own, chosen) in zip(ends, parts, strict=True)]
-    return sums, weights.weights.numpy()
-
-
-def _rows_between(points, first, end):
-    """Return a range of rows of a Warp array; Warp's slices may not be empty."""
-    import warp as wp
-
-    none = wp.empty((0, points.shape[1]), dtype=wp.vec3, device=points.device)
-    return points[first:end] if end > first else none
+        chosen = interpolation.guide_weights.chosen_strands(own.guide_weights, strands)
+        weights = interpolation.guide_weights.limited(
+            own.guide_weights, guide_points, binding.guide_normals, binding.limits, chosen
+        )
+        sums.append(
+            interpolation.interpolation.interpolate(
+                own.positions,
+                own.normals,
+                guide_points,
+                binding.guide_normals,
+                weights,
+                binding.keep_length,
+                chosen=chosen,
+            )
+        )
+        of_all.append(weights.weights)
+    return sums, of_all

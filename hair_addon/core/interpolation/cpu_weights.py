@@ -42,6 +42,7 @@ def sum_points(guide: int, guide_points: wp.array2d[wp.vec3], out_sums: wp.array
 @wp.func_native(native_code.body(__file__, "limit.cpp", WIDTH=NUMBERS))
 def limit(
     strand: int,
+    out_row: int,
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],

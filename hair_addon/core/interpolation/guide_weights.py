@@ -15,7 +15,9 @@ shapes and not on roots, so it needs no search, and combing repeats it.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -124,11 +126,51 @@ def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
     return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
 
 
-def rows_here(array: wp.array, chosen: np.ndarray) -> np.ndarray:
-    """Return a copy of some rows of a Warp array in CPU memory; chosen: (M,) indices."""
-    if array.device.is_cpu:
-        return array.numpy()[chosen]
-    return rows(array, wp.array(chosen, dtype=int, device=array.device)).numpy()
+@dataclass(frozen=True)
+class ChosenStrands:
+    """Indices int32 of some strands, and of the guides that they follow, on the strands' device."""
+
+    strands: wp.array
+    guides: wp.array
+
+
+def chosen_strands(guide_weights: GuideWeights, chosen: np.ndarray) -> ChosenStrands:
+    """Return the `ChosenStrands` with indices (M,). Raises `HairError` if there is no such strand."""
+    require_indices("strands", chosen, len(guide_weights.indices))
+    indices = guide_weights.indices
+    strands = wp.array(np.asarray(chosen, np.int32), dtype=int, device=indices.device)
+    its_guides = indices.numpy()[chosen] if indices.device.is_cpu else rows(indices, strands).numpy()
+    is_followed = np.zeros(guide_weights.guide_count + 1, bool)
+    is_followed[its_guides] = True  # index -1 stands for no guide
+    guides = np.flatnonzero(is_followed[:-1]).astype(np.int32)
+    return ChosenStrands(strands, wp.array(guides, dtype=int, device=indices.device))
+
+
+@wp.func
+def chosen_at(chosen: wp.array[int], row: int):
+    """Return the chosen strand or guide of a row; the row itself if none are chosen."""
+    if chosen.shape[0] == 0:
+        return row
+    return chosen[row]
+
+
+def strand_rows(chosen: ChosenStrands | None, device: wp.DeviceLike) -> tuple[Any, Callable[[wp.array], Any]]:
+    """Return the arguments of a launch for the first parameter of a kernel, and for arrays of all strands."""
+    if chosen is None:
+        return wp.empty(0, dtype=int, device=device), Rows
+    return Rows(chosen.strands), lambda array: array
+
+
+def launch_guides(
+    kernel: wp.Kernel, inputs: list[wp.array], outputs: list[wp.array], chosen: ChosenStrands | None
+) -> None:
+    """Run a kernel on all guides, or on those that chosen strands follow; all arrays have a row for each guide."""
+    device = inputs[0].device
+    if chosen is None:
+        none = wp.empty(0, dtype=int, device=device)
+        parallel.launch(kernel, len(inputs[0]), [none, *map(Rows, inputs)], outputs, device)
+    else:
+        parallel.launch(kernel, len(chosen.guides), [Rows(chosen.guides), *inputs, *outputs], [], device)
 
 
 def find_candidates(
@@ -255,36 +297,28 @@ def _some(array, chosen):
 
 
 def limited(
-    guide_weights: GuideWeights, guide_points: wp.array2d[wp.vec3], guide_normals: wp.array[wp.vec3], limits: Limits
+    guide_weights: GuideWeights,
+    guide_points: wp.array2d[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    limits: Limits,
+    chosen: ChosenStrands | None = None,
 ) -> GuideWeights:
     """Return `GuideWeights` without guides that differ too much from the nearest one; points (G, P) [m], normals (G,).
 
     A guide's weight fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
+    chosen: strands whose weights (M, k) are computed, None for all.
     """
     require_count("guides", len(guide_points), guide_weights.guide_count)
+    require_count("guide normals", len(guide_normals), len(guide_points))
     device = guide_points.device
     shapes = wp.empty((len(guide_points), cpu_weights.NUMBERS), dtype=float, device=device)
-    parallel.launch(
-        _shapes,
-        len(guide_points),
-        inputs=[Rows(guide_points), Rows(guide_normals)],
-        outputs=[shapes],
-        device=device,
-    )
-    weights = wp.empty_like(guide_weights.weights)
-    parallel.launch(
-        _limit,
-        len(weights),
-        inputs=[
-            Rows(guide_weights.indices),
-            Rows(guide_weights.weights),
-            Rows(guide_weights.turns),
-            shapes,
-            *limits.fading,
-        ],
-        outputs=[weights],
-        device=device,
-    )
+    launch_guides(_shapes, [guide_points, guide_normals], [shapes], chosen)
+    row_count = len(guide_weights.weights) if chosen is None else len(chosen.strands)
+    weights = wp.empty((row_count, guide_weights.weights.shape[1]), dtype=float, device=device)
+    strands, of_strand = strand_rows(chosen, device)
+    arrays = (guide_weights.indices, guide_weights.weights, guide_weights.turns)
+    inputs = [strands, *map(of_strand, arrays), shapes, *limits.fading]
+    parallel.launch(_limit, row_count, inputs, [weights], device)
     return replace(guide_weights, weights=weights)
 
 
@@ -363,13 +397,14 @@ def _weigh(
 
 @wp.kernel
 def _shapes(
+    chosen: wp.array[int],
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     # outputs
     out_shapes: wp.array2d[float],
 ):
     """Unit directions in the guide's frame, of its lower half and from root to tip, and the logarithm of its length."""
-    guide = wp.tid()
+    guide = chosen_at(chosen, wp.tid())
     normal = guide_normals[guide]
     tangent, bitangent = frame(normal)
     root = guide_points[guide, 0]
@@ -389,6 +424,7 @@ def _shapes(
 
 @wp.kernel
 def _limit(
+    chosen: wp.array[int],
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
@@ -400,6 +436,17 @@ def _limit(
     # outputs
     out_weights: wp.array2d[float],
 ):
+    row = wp.tid()
     cpu_weights.limit(
-        wp.tid(), indices, weights, turns, shapes, cosine_none, per_cosine, length_limit, per_length, out_weights
+        chosen_at(chosen, row),
+        row,
+        indices,
+        weights,
+        turns,
+        shapes,
+        cosine_none,
+        per_cosine,
+        length_limit,
+        per_length,
+        out_weights,
     )

@@ -6,7 +6,7 @@
 // The body of `_sum_guides` in interpolation.py. Parameters, for S strands of P points, K slots of guides per strand
 // and G guides:
 //
-//   int strand                              index of the strand
+//   int strand, int out_row                 index of the strand, and of the row of its weights and results
 //   vec3 root                               its root [m]
 //   vec3 tangent, bitangent, normal         its frame
 //   array_t<float> guide_rows               (G, 8) normal and position of each guide's root, its length, and a zero
@@ -14,11 +14,11 @@
 //                                           [m], 0 past the tip. In each group: on a CPU all x, all y, all z, then all
 //                                           lengths; on a GPU x, y, z and length of each segment
 //   array_t<int> indices                    (S, K) guides of each strand
-//   array_t<float> weights                  (S, K) their weights, zero in unused slots
+//   array_t<float> weights                  (R, K) their weights, zero in unused slots
 //   array_t<vec2> turns                     (S, K) cosine and sine of the angle from a guide's frame to the strand's
 //   float spread                            limit of a strand's turn against its guides (interpolation.py)
 //   float keep_length                       0 to 1: blend to segments with the guides' mean length
-//   array_t<vec3> out_points                (S, P) [m]
+//   array_t<vec3> out_points                (R, P) [m]
 //
 // Constants:
 //
@@ -45,9 +45,9 @@ struct Segments {
   lanes x, y, z, size;
 };
 const auto guide_of = [&](int slot) ALWAYS_INLINE {
-  const size_t place = size_t(strand) * slot_count + slot;
+  const size_t place = size_t(strand) * slot_count + slot, share_place = size_t(out_row) * slot_count + slot;
   Guide guide;
-  guide.share = weights.data[place];
+  guide.share = weights.data[share_place];
   guide.offsets = offsets.data + size_t(indices.data[place]) * group_count * (4 * SEGMENTS);
   guide.cosine = guide.share * turns.data[place][0];
   guide.sine = guide.share * turns.data[place][1];
@@ -82,7 +82,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   // Slots are read for each group: registers with a dynamic index would be memory.
   const auto for_guides = [&](auto use) {
     for (int slot = 0; slot < slot_count; ++slot) {
-      if (weights.data[size_t(strand) * slot_count + slot] > 0.0f) use(guide_of(slot));
+      if (weights.data[size_t(out_row) * slot_count + slot] > 0.0f) use(guide_of(slot));
     }
   };
 #else
@@ -130,7 +130,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   Guide guides[SLOT_LIMIT];
   int guide_count = 0;
   for (int slot = 0; slot < slot_count; ++slot) {
-    if (weights.data[size_t(strand) * slot_count + slot] > 0.0f) guides[guide_count++] = guide_of(slot);
+    if (weights.data[size_t(out_row) * slot_count + slot] > 0.0f) guides[guide_count++] = guide_of(slot);
   }
   const auto for_guides = [&](auto use) ALWAYS_INLINE {
     for (int number = 0; number < guide_count; ++number) use(guides[number]);
@@ -144,7 +144,7 @@ for (int first = 0; first < slot_count; first += LANES) {
   ints its_guides = -1;
   lanes share = 0.0f;
   read_lanes(its_guides, indices.data + size_t(strand) * slot_count + first, count);
-  read_lanes(share, weights.data + size_t(strand) * slot_count + first, count);
+  read_lanes(share, weights.data + size_t(out_row) * slot_count + first, count);
   lanes its[8];
   read_columns(its, its_guides, guide_rows.data);
   const auto weighed = [&](lanes value) { return share > 0.0f ? share * value : lanes(0.0f); };
@@ -172,7 +172,7 @@ if (along_normal[0] != normal[0] || along_normal[1] != normal[1] || along_normal
   put(along_bitangent, carried_along({bitangent[0], bitangent[1], bitangent[2]}, own, limited));
 }
 
-float* row = reinterpret_cast<float*>(out_points.data) + size_t(strand) * point_count * 3;
+float* row = reinterpret_cast<float*>(out_points.data) + size_t(out_row) * point_count * 3;
 float last_x = root[0], last_y = root[1], last_z = root[2];
 row[0] = last_x;
 row[1] = last_y;

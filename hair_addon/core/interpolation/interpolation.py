@@ -36,7 +36,7 @@ from ..geometry.search.hash_grid import LIMIT
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
-from .guide_weights import GuideWeights, frame
+from .guide_weights import ChosenStrands, GuideWeights, chosen_at, frame, launch_guides, strand_rows
 from .hair_binding import SPREAD
 
 wp.set_module_options({"enable_backward": False})
@@ -53,49 +53,50 @@ def interpolate(
     keep_length: float = 1.0,
     out: wp.array2d[wp.vec3] | None = None,
     under_way: Callable[[], None] | None = None,
+    chosen: ChosenStrands | None = None,
 ) -> wp.array2d[wp.vec3]:
     """Return (S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,), for guides (G, P) [m], normals (G,).
 
     keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
-    fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`. Raises `HairError` if
+    fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`; chosen: strands to compute, in
+    whose order the results and the weights are, which `limited` returns for the same strands. Raises `HairError` if
     counts do not match.
     """
+    row_count = len(roots) if chosen is None else len(chosen.strands)
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_points))
     require_count("guides", len(guide_points), guide_weights.guide_count)
-    for array in (guide_weights.indices, guide_weights.weights, guide_weights.turns):
+    require_count("guide weights", len(guide_weights.weights), row_count)
+    for array in (guide_weights.indices, guide_weights.turns):
         require_count("guide weights", len(array), len(roots))
+    for array in (guide_weights.weights, guide_weights.turns):
         require_count("guide weights of a strand", array.shape[1], guide_weights.indices.shape[1])
     if guide_weights.indices.shape[1] > LIMIT:
         raise ValueError(f"at most {LIMIT} guides a strand, not {guide_weights.indices.shape[1]}")
     if out is not None:
-        require_count("strands to fill", len(out), len(roots))
+        require_count("strands to fill", len(out), row_count)
         require_count("points to fill", out.shape[1], guide_points.shape[1])
     guide_count, point_count = guide_points.shape
     group_count = -(-(point_count - 1) // SEGMENTS)
     on_cpu = wp.get_device(roots.device).is_cpu
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     guide_rows = wp.empty((guide_count, 8), dtype=float, device=roots.device)
-    parallel.launch(
-        _put_offsets,
-        guide_count,
-        inputs=[Rows(guide_points), Rows(guide_normals)],
-        outputs=[offsets, guide_rows],
-        device=roots.device,
-    )
+    launch_guides(_put_offsets, [guide_points, guide_normals], [offsets, guide_rows], chosen)
     threads = 1 if on_cpu else SEGMENTS
-    points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
+    points = parallel.empty_vectors((row_count, point_count), roots.device) if out is None else out
+    strands, of_strand = strand_rows(chosen, roots.device)
     parallel.launch(
         _put_strands,
-        len(roots),
+        row_count,
         inputs=[
-            Rows(roots),
-            Rows(normals),
+            strands,
+            of_strand(roots),
+            of_strand(normals),
             offsets,
             guide_rows,
-            Rows(guide_weights.indices),
+            of_strand(guide_weights.indices),
             Rows(guide_weights.weights),
-            Rows(guide_weights.turns),
+            of_strand(guide_weights.turns),
             SPREAD,
             keep_length,
             threads,
@@ -111,6 +112,7 @@ def interpolate(
 @wp.func_native(native_code.body(__file__, "interpolation.cpp", WIDTH=SEGMENTS, SEGMENTS=SEGMENTS, SLOT_LIMIT=LIMIT))
 def _sum_guides(
     strand: int,
+    out_row: int,
     root: wp.vec3,
     tangent: wp.vec3,
     bitangent: wp.vec3,
@@ -128,6 +130,7 @@ def _sum_guides(
 
 @wp.kernel
 def _put_strands(
+    chosen: wp.array[int],
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
     offsets: wp.array3d[float],
@@ -141,11 +144,13 @@ def _put_strands(
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
-    strand = wp.tid() / threads
+    row = wp.tid() / threads
+    strand = chosen_at(chosen, row)
     normal = normals[strand]
     tangent, bitangent = frame(normal)
     _sum_guides(
         strand,
+        row,
         roots[strand],
         tangent,
         bitangent,
@@ -174,13 +179,14 @@ def _frame_segments(
 
 @wp.kernel
 def _put_offsets(
+    chosen: wp.array[int],
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     # outputs
     out_offsets: wp.array3d[float],
     out_rows: wp.array2d[float],
 ):
-    guide = wp.tid()
+    guide = chosen_at(chosen, wp.tid())
     tangent, bitangent = frame(guide_normals[guide])
     length = _frame_segments(guide, tangent, bitangent, guide_normals[guide], guide_points, out_offsets)
     for axis in range(3):

@@ -4,7 +4,7 @@
 //
 // The body of `limit` in cpu_weights.py. Parameters, for S strands, K slots of guides a strand and G guides:
 //
-//   int strand                          the strand whose weights are limited
+//   int strand, int out_row             the strand whose weights are limited, and the row of its results
 //   array_t<int> indices                (S, K) guides of each strand, the nearest first, -1 in unused slots
 //   array_t<float> weights              (S, K) their weights
 //   array_t<vec2> turns                 (S, K) cosine and sine of the angle from a guide's frame to the strand's
@@ -13,7 +13,7 @@
 //   float cosine_none, per_cosine       cosine of the angle between directions at which a guide's weight is zero, and
 //                                       1 / the range of cosines over which it fades
 //   float length_limit, per_length      the same for differences of logarithms, and 1 / half of it, its fading range
-//   array_t<float> out_weights          (S, K) weights of sum 1
+//   array_t<float> out_weights          (R, K) weights of sum 1
 
 #include "lanes.h"
 #include "guide_rows.h"
@@ -30,7 +30,7 @@ const int slot_count = indices.shape[1];
 const int* index = indices.data + size_t(strand) * slot_count;
 const float* before = weights.data + size_t(strand) * slot_count;
 const float* turn = reinterpret_cast<const float*>(turns.data) + size_t(strand) * slot_count * 2;
-float* weight = out_weights.data + size_t(strand) * slot_count;
+float* weight = out_weights.data + size_t(out_row) * slot_count;
 float lower_1[3], tip_1[3], length_1 = 0.0f;  // of the nearest guide
 for (int first = 0; first < slot_count; first += LANES) {
   const int count = slot_count - first < LANES ? slot_count - first : LANES;
