@@ -65,14 +65,7 @@ def follow_surface(
     if faces_of(state.topology) != faces_of(surface.topology) or roots is None or stored is None:
         if not follows_edits or frame_faces.differs_by_frame(guide_curves, surface):
             return Followed.NOTHING
-        curves.require_not_linked(guide_curves)
-        was_open = state.is_on_open
-        lost, lost_between = edited_faces.reroot(guide_curves, surface, depsgraph)
-        if lost or lost_between:
-            strand_count = lost_between if state.kind == "GUIDES" else lost
-            is_remeshed = was_open and lost == len(guide_curves.curves) and not surface.is_open
-            sentence = _CLOSED if is_remeshed else _ROOTED_AGAIN[state.kind]
-            state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
+        _reroot(guide_curves, surface, depsgraph)
         return Followed.EDITED
     if before is not None and before.shape != surface.rest.shape:
         before = surface.rest
@@ -85,16 +78,34 @@ def follow_surface(
         _carry(guide_curves, surface, change, depsgraph)
         return Followed.APPLIED
     if before is not None and follows_edits:
-        curves.require_not_linked(guide_curves)
-        require_finite(surface.rest)
-        shift = applied_transforms.shift_of(before, surface)
-        if shift is not None:
-            for one in (guide_curves, *applied_transforms.followed_by(guide_curves)):
-                surface_space.note_applied(one, shift, before)
-        edited_faces.follow_moved(guide_curves, surface, before)
-        surface_space.keep_surface(guide_curves, surface)
+        _follow_moved(guide_curves, surface, before)
         return Followed.EDITED
     return Followed.NOTHING
+
+
+def _reroot(guide_curves, surface, depsgraph):
+    """Root strands on other faces; strands of deleted faces are reported in the status."""
+    curves.require_not_linked(guide_curves)
+    state = guide_curves.vellus
+    was_open = state.is_on_open
+    lost, lost_between = edited_faces.reroot(guide_curves, surface, depsgraph)
+    if lost or lost_between:
+        strand_count = lost_between if state.kind == "GUIDES" else lost
+        is_remeshed = was_open and lost == len(guide_curves.curves) and not surface.is_open
+        sentence = _CLOSED if is_remeshed else _ROOTED_AGAIN[state.kind]
+        state.status = sentence.format(name=surface.name, guides=lost, strands=strand_count)
+
+
+def _follow_moved(guide_curves, surface, before):
+    """Move strands with the vertices of their surface; before: (V, 3) of the vertices."""
+    curves.require_not_linked(guide_curves)
+    require_finite(surface.rest)
+    shift = applied_transforms.shift_of(before, surface)
+    if shift is not None:
+        for one in (guide_curves, *applied_transforms.followed_by(guide_curves)):
+            surface_space.note_applied(one, shift, before)
+    edited_faces.follow_moved(guide_curves, surface, before)
+    surface_space.keep_surface(guide_curves, surface)
 
 
 def _is_divided_alone(guide_curves, surface, before):
