@@ -151,47 +151,57 @@ class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
         return "{count} points per strand", {"count": hair_styles.use_points(hair_of(context.object))}
 
 
-class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
+class _Paint(HairOperator):
+    """Mixin of operators that start or stop painting on the surface of the active hair."""
+
+    asked = ""  # message if nothing can be painted
+
+    @classmethod
+    def applies(cls, context):
+        if painted_masks.is_painting(context.object):
+            return True
+        cls.poll_message_set(cls.asked)
+        hair = hair_of(context.object)
+        return context.mode == "OBJECT" and hair is not None and grown_on(hair) is not None
+
+    def begin(self, hair, context):
+        """Start painting for hair Curves. Raises `HairError`."""
+        raise NotImplementedError
+
+    def change(self, context):
+        if painted_masks.is_painting(context.object):
+            painted_masks.stop(context.object, context)
+        else:
+            self.begin(hair_of(context.object), context)
+
+
+class VELLUS_OT_paint_style_mask(_Paint, bpy.types.Operator):
     """Paint the mask of the active style with Blender's brushes, while the hair follows; or stop painting"""
 
     bl_idname = "vellus.paint_style_mask"
     bl_label = "Paint Style Mask"
 
+    asked = "Select hair with styles, on a surface, in Object Mode."
+
     @classmethod
     def applies(cls, context):
-        if painted_masks.is_painting(context.object):
-            return True
-        cls.poll_message_set("Select hair with styles, on a surface, in Object Mode.")
-        hair = hair_of(context.object)
-        has_place = context.mode == "OBJECT" and hair is not None and grown_on(hair) is not None
-        return has_place and active_style_of(context) is not None
+        has_style = painted_masks.is_painting(context.object) or active_style_of(context) is not None
+        return super().applies(context) and has_style
 
-    def change(self, context):
-        if painted_masks.is_painting(context.object):
-            painted_masks.stop(context.object, context)
-        else:
-            painted_masks.paint(hair_of(context.object), active_style_of(context), context)
+    def begin(self, hair, context):
+        painted_masks.paint(hair, active_style_of(context), context)
 
 
-class VELLUS_OT_paint_density(HairOperator, bpy.types.Operator):
+class VELLUS_OT_paint_density(_Paint, bpy.types.Operator):
     """Paint the density of strands on the surface with Blender's brushes, or stop painting"""
 
     bl_idname = "vellus.paint_density"
     bl_label = "Paint Density"
 
-    @classmethod
-    def applies(cls, context):
-        if painted_masks.is_painting(context.object):
-            return True
-        cls.poll_message_set("Select hair on a surface, in Object Mode.")
-        hair = hair_of(context.object)
-        return context.mode == "OBJECT" and hair is not None and grown_on(hair) is not None
+    asked = "Select hair on a surface, in Object Mode."
 
-    def change(self, context):
-        if painted_masks.is_painting(context.object):
-            painted_masks.stop(context.object, context)
-        else:
-            painted_density.paint(hair_of(context.object), context)
+    def begin(self, hair, context):
+        painted_density.paint(hair, context)
 
 
 class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
