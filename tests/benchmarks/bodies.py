@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix, Vector
 
-from hair_addon.core.geometry.mesh import TriMesh
+from tests.support.pictures.render_probe import read_mesh
 
 _SMOOTHINGS = 4
 _FINGERS = 0.075, 0.085, 0.08, 0.06  # lengths [m]
@@ -21,13 +21,7 @@ def body(name):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     makers = {"person": _person, "hand": _lone_hand, "animal": _animal, "cloth": _cloth}
     shown = makers[name]()
-    mesh = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    mesh.calc_loop_triangles()
-    vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return TriMesh(vertices, triangles)
+    return read_mesh(shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
 
 
 def _person():

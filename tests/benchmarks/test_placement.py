@@ -26,6 +26,7 @@ from tests.benchmarks.bodies import body
 from tests.benchmarks.placement_quality import evenness
 from tests.support.devices import DEVICE
 from tests.support.meshes import HEAD, read_obj, subdivided_sphere
+from tests.support.pictures.render_probe import read_mesh
 
 # Of each, in turns: the quickest counts, as other work can only slow one down. Without peers times are compared with
 # nothing, and sites are the same each time.
@@ -49,13 +50,7 @@ def suzanne():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add()
     bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    mesh = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    mesh.calc_loop_triangles()
-    vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return TriMesh(vertices, triangles)
+    return read_mesh(bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
 
 
 def ours(mesh, count):

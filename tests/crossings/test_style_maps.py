@@ -18,7 +18,7 @@ from hair_addon.blender.ui import map_rows
 from tests.support.commands import load, run_here
 from tests.support.exchange.imported import select
 from tests.support.interface.layout import Layout
-from tests.support.overridden import override, parts
+from tests.support.overridden import override_keyed, parts
 from tests.support.reading import points
 
 RADIUS = "styles.Curl.radius"
@@ -112,21 +112,7 @@ def test_undo_and_redo(curls):
 def test_linked_and_overridden_hair(curls, tmp_path):
     """An overridden character plays keys of a varied setting as its file does, and gives its map to other meshes."""
     vary(curls)
-    state = curls.data.vellus
-    for frame, radius in ((1, HIGH), (10, 2.0 * HIGH)):
-        state.styles[0].curl.radius = radius
-        curls.data.keyframe_insert("vellus.styles[0].curl.radius", frame=frame)
-    played, hair = [], curls
-    for is_overridden in (False, True):
-        if is_overridden:
-            override(hair, tmp_path)
-            hair = parts()[2]
-        for frame in (1, 10):
-            bpy.context.scene.frame_set(frame)
-            played.append(points(hair))
-    assert np.abs(played[0] - played[1]).max() > 1e-3
-    for alone, overridden in zip(played[:2], played[2:], strict=True):
-        np.testing.assert_allclose(overridden, alone, atol=1e-5)
+    hair = override_keyed(curls, tmp_path, 0, (HIGH, 2.0 * HIGH))
     bpy.context.scene.frame_set(1)
     sphere = parts()[0]
     copy = bpy.data.objects.new("Copy", sphere.data.copy())

@@ -2,6 +2,11 @@
 """A character that a shot links and overrides, with its hair."""
 
 import bpy
+import numpy as np
+
+from tests.support.reading import points
+
+_FRAMES = (1, 10)
 
 
 def override(hair, folder):
@@ -36,3 +41,27 @@ def parts():
     found = [o for o in bpy.data.objects if o.override_library is not None]
     curves = {o.data.vellus.kind: o for o in found if o.type == "CURVES"}
     return next(o for o in found if o.type == "MESH"), curves["GUIDES"], curves["HAIR"]
+
+
+def override_keyed(hair, folder, style, radii):
+    """Key the radius of a style's curls at frames 1 and 10, override the hair, and assert that it plays as before.
+
+    Returns the overridden hair.
+    """
+    for frame, radius in zip(_FRAMES, radii, strict=True):
+        hair.data.vellus.styles[style].curl.radius = radius
+        hair.data.keyframe_insert(f"vellus.styles[{style}].curl.radius", frame=frame)
+    alone = _played(hair)
+    override(hair, folder)
+    overridden = _played(parts()[2])
+    assert np.abs(alone[0] - alone[1]).max() > 1e-3
+    np.testing.assert_allclose(overridden, alone, atol=1e-5)
+    return parts()[2]
+
+
+def _played(hair):
+    found = []
+    for frame in _FRAMES:
+        bpy.context.scene.frame_set(frame)
+        found.append(points(hair))
+    return found

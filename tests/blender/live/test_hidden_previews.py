@@ -12,6 +12,7 @@ from hair_addon.blender.live import handlers, hidden_previews, live_hair, moving
 from hair_addon.blender.render.viewport import viewport
 from tests.blender.live.test_carried_strands import bend
 from tests.blender.live.test_moving_surfaces import is_left_out, objects, view_space
+from tests.support.pictures import render_probe
 from tests.support.pictures.gpu_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points
 
@@ -109,24 +110,13 @@ def test_saved_files_and_undo_have_all_strands(previewed, tmp_path):
 
 
 def test_renders_have_all_strands(previewed, monkeypatch):
-    seen = []
-
-    class Reader(bpy.types.RenderEngine):
-        bl_idname, bl_label = "READER", "Reader"
-
-        def render(self, depsgraph):
-            seen.append(evaluated_points(previewed, depsgraph))
-
     monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
-    bpy.utils.register_class(Reader)
-    bpy.context.scene.render.engine = "READER"
-    bpy.context.scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    bpy.ops.render.render()
-    bpy.utils.unregister_class(Reader)
+    with render_probe.reading(lambda depsgraph: evaluated_points(previewed, depsgraph)) as render:
+        (seen,) = render()
     assert is_left_out(previewed)
     hidden_hair.show()
     bpy.context.view_layer.update()
-    np.testing.assert_array_equal(seen[0], evaluated_points(previewed))
+    np.testing.assert_array_equal(seen, evaluated_points(previewed))
 
 
 def move_slider(hair, value):

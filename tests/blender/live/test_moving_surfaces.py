@@ -15,6 +15,7 @@ from hair_addon.blender.live import handlers, live_hair, moving_surfaces
 from hair_addon.blender.render import hair_cache
 from tests.blender.live.test_carried_strands import bend
 from tests.support.counting import Traffic, counts_of
+from tests.support.pictures import render_probe
 from tests.support.pictures.gpu_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points, points, write_points
 
@@ -292,21 +293,9 @@ def test_without_a_window_nothing_is_hidden(bent, monkeypatch):
 
 
 def test_renders_carry_hair_that_viewports_hide(playing, monkeypatch):
-    seen = []
-
-    class Reader(bpy.types.RenderEngine):
-        bl_idname, bl_label = "READER", "Reader"
-
-        def render(self, depsgraph):
-            seen.append((depsgraph.mode, evaluated_points(playing, depsgraph)))
-
     monkeypatch.setattr(handlers, "_show_hidden", lambda: None)
-    bpy.utils.register_class(Reader)
-    bpy.context.scene.render.engine = "READER"
-    bpy.context.scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    bpy.ops.render.render()
-    bpy.utils.unregister_class(Reader)
-    ((mode, rendered),) = seen
+    with render_probe.reading(lambda depsgraph: (depsgraph.mode, evaluated_points(playing, depsgraph))) as render:
+        ((mode, rendered),) = render()
     assert are_hidden() and mode == "RENDER"
     monkeypatch.undo()
     moving_surfaces.resume()

@@ -12,7 +12,7 @@ from hair_addon.blender.live import handlers
 from hair_addon.blender.materials import looks, materials
 from hair_addon.core.shading import appearance
 from tests.support.guide_tools import grown_from_nothing, lengths_of
-from tests.support.pictures.rendering import add_orthographic_camera
+from tests.support.pictures import render_probe
 from tests.support.reading import points
 
 
@@ -144,28 +144,15 @@ def test_so_does_that_of_a_style_s_driver(hair, path):
 @pytest.fixture
 def rendered():
     """Return a function that renders a frame: (N, 3) points of the hair that the render reads, and their radii."""
-    seen = []
 
-    class Look(bpy.types.RenderEngine):
-        bl_idname, bl_label = "VELLUS_TEST_LOOK", "Look"
+    def read(depsgraph):
+        shown = depsgraph.objects["Hair"].data
+        radii = np.empty(len(shown.points), np.float32)
+        shown.attributes["radius"].data.foreach_get("value", radii)
+        return curves.read_points(shown), radii
 
-        def render(self, depsgraph):
-            shown = depsgraph.objects["Hair"].data
-            radii = np.empty(len(shown.points), np.float32)
-            shown.attributes["radius"].data.foreach_get("value", radii)
-            seen.append((curves.read_points(shown), radii))
-
-    def render(frame):
-        scene = bpy.context.scene
-        scene.render.engine, scene.frame_start, scene.frame_end = Look.bl_idname, frame, frame
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        add_orthographic_camera(scene)
-        bpy.ops.render.render(animation=True)
-        return seen[-1]
-
-    bpy.utils.register_class(Look)
-    yield render
-    bpy.utils.unregister_class(Look)
+    with render_probe.reading(read) as render:
+        yield lambda frame: render(frames=(frame, frame, 1))[0]
 
 
 def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):

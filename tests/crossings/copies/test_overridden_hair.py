@@ -10,7 +10,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.render import hair_cache
 from tests.support.dynamics.following import update
-from tests.support.overridden import override, parts, reopen
+from tests.support.overridden import override, override_keyed, parts, reopen
 from tests.support.reading import evaluated_points, points, snapshot
 
 REFUSED = "is a library override: make it local first"
@@ -121,21 +121,7 @@ def test_a_library_override_is_read_drawn_and_given_to_other_meshes(styled, tmp_
 
 
 def test_keys_of_a_library_override_play(styled, tmp_path):
-    state = styled.data.vellus
-    for frame, radius in ((1, 0.02), (10, 0.05)):
-        state.styles[1].curl.radius = radius
-        styled.data.keyframe_insert("vellus.styles[1].curl.radius", frame=frame)
-    played = []
-    for is_overridden in (False, True):
-        if is_overridden:
-            override(styled, tmp_path)
-            styled = parts()[2]
-        for frame in (1, 10):
-            bpy.context.scene.frame_set(frame)
-            played.append(points(styled))
-    assert np.abs(played[0] - played[1]).max() > 1e-3
-    for alone, overridden in zip(played[:2], played[2:], strict=True):
-        np.testing.assert_allclose(overridden, alone, atol=1e-5)
+    override_keyed(styled, tmp_path, 1, (0.02, 0.05))
 
 
 def test_made_local_it_is_changed_and_kept(styled, tmp_path):

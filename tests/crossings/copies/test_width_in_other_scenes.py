@@ -5,7 +5,7 @@ import bpy
 import pytest
 
 from hair_addon.blender.data import thin_hair
-from tests.support.pictures.rendering import add_orthographic_camera
+from tests.support.pictures import render_probe
 
 
 @pytest.fixture
@@ -24,25 +24,8 @@ def character(hair, tmp_path):
 @pytest.fixture
 def rendered_type():
     """Return a function that renders a scene in the background, and returns how that render draws hair."""
-    seen = []
-
-    class Look(bpy.types.RenderEngine):
-        bl_idname, bl_label = "VELLUS_TEST_LOOK", "Look"
-
-        def render(self, depsgraph):
-            seen.append(depsgraph.scene_eval.render.hair_type)
-
-    def render(scene):
-        scene.render.engine = Look.bl_idname
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        if scene.camera is None:
-            add_orthographic_camera(scene)
-        bpy.ops.render.render(scene=scene.name)
-        return seen[-1]
-
-    bpy.utils.register_class(Look)
-    yield render
-    bpy.utils.unregister_class(Look)
+    with render_probe.reading(lambda depsgraph: depsgraph.scene_eval.render.hair_type) as render:
+        yield lambda scene: render(scene)[0]
 
 
 def bring(way, path):

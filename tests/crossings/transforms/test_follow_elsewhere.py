@@ -6,27 +6,17 @@ import numpy as np
 import pytest
 
 from hair_addon.core.geometry.closest_point import SurfaceQuery
-from hair_addon.core.geometry.mesh import TriMesh, positions
+from hair_addon.core.geometry.mesh import positions
 from tests.support.dynamics.following import assert_follows, grow, surface_points, update
+from tests.support.pictures import render_probe
 from tests.support.reading import evaluated_points, points
 
 
-class _Reader(bpy.types.RenderEngine):
-    """A mock of Cycles that stores the hair and its surface in every frame as a renderer receives them."""
-
-    bl_idname = "VELLUS_TEST_READER"
-    bl_label = "Reader"
-    seen = {}  # frame → ((S, P, 3), TriMesh)
-
-    def render(self, depsgraph):
-        handed = {i.object.name: i.object.data for i in depsgraph.object_instances}
-        curves, mesh = handed["Hair"], handed["Grid"]
-        points = np.empty((len(curves.points), 3), np.float32)
-        curves.attributes["position"].data.foreach_get("vector", points.ravel())
-        mesh.calc_loop_triangles()
-        triangles = np.array([triangle.vertices[:] for triangle in mesh.loop_triangles], np.int32)
-        surface = TriMesh(np.array([vertex.co for vertex in mesh.vertices], np.float32), triangles)
-        self.seen[depsgraph.scene.frame_current] = points.reshape(len(curves.curves), -1, 3), surface
+def read(depsgraph):
+    """Return (frame, strands of the hair, `TriMesh` of its surface) as Cycles receives them."""
+    handed = {i.object.name: i.object.data for i in depsgraph.object_instances}
+    strands, surface = render_probe.read_points(handed["Hair"]), render_probe.read_mesh(handed["Grid"])
+    return depsgraph.scene.frame_current, strands, surface
 
 
 def test_every_frame_of_a_render_has_its_hair(arm, scene, tmp_path):
@@ -35,26 +25,18 @@ def test_every_frame_of_a_render_has_its_hair(arm, scene, tmp_path):
     finer.subdivision_type, finer.levels, finer.render_levels = "SIMPLE", 0, 1
     update()
     _guides, hair = grow(arm)
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(scene.camera)
-    bpy.utils.register_class(_Reader)
-    try:
-        scene.render.engine = _Reader.bl_idname
-        scene.render.filepath = str(tmp_path / "frame")
-        scene.render.resolution_x = scene.render.resolution_y = 8
-        scene.frame_start, scene.frame_end, scene.frame_step = 1, 11, 5
-        bpy.ops.render.render(animation=True)
-    finally:
-        bpy.utils.unregister_class(_Reader)
-    assert sorted(_Reader.seen) == [1, 6, 11]
-    for frame, (found, surface) in _Reader.seen.items():
+    scene.render.filepath = str(tmp_path / "frame")
+    with render_probe.reading(read) as render:
+        seen = render(frames=(1, 11, 5))
+    assert [frame for frame, *_ in seen] == [1, 6, 11]
+    for frame, found, surface in seen:
         assert len(surface.vertices) > len(arm.data.vertices)
         nearest = positions(surface, SurfaceQuery(surface).nearest(found[:, 0]))
         np.testing.assert_allclose(found[:, 0], nearest, atol=1e-5)
         scene.frame_set(frame)
         # Vertices in between have rotations of their own: where the arm bends, strands of 0.3 m turn a little more.
         np.testing.assert_allclose(found, evaluated_points(hair), atol=0.05)
-    assert np.abs(_Reader.seen[11][0] - _Reader.seen[1][0]).max() > 0.5
+    assert np.abs(seen[2][1] - seen[0][1]).max() > 0.5
 
 
 def test_an_export_has_hair_in_every_frame(arm, scene, tmp_path):

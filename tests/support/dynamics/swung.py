@@ -23,3 +23,12 @@ def simulate(guides, folder, **settings):
         setattr(state.dynamics, name, value)
     state.simulates = True
     bpy.context.view_layer.update()
+
+
+def simulate_apart(folder):
+    """Simulate guides on a swinging sphere, which touch neither each other nor the sphere; returns their object."""
+    swing(bpy.data.objects["Sphere"])
+    guides = bpy.data.objects["Guides"]
+    apart = {"hair_friction": 0.0, "hair_pressure": 0.0, "collides_with_surface": False, "sag_free": False}
+    simulate(guides, folder, bend_stiffness=1.0, **apart)
+    return guides

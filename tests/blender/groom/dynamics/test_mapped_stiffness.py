@@ -14,7 +14,7 @@ from hair_addon.core.dynamics.rod.settings import VARIED, DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support.commands import run_here
-from tests.support.dynamics.swung import simulate, swing
+from tests.support.dynamics.swung import simulate_apart
 
 SETTING = "dynamics.bend_stiffness"
 LAST = 5
@@ -26,11 +26,7 @@ VALUES = {"bend_stiffness": (1.0, 500.0), "damping": (0.0, 0.25), "hold": (0.0, 
 @pytest.fixture
 def swung(hair, tmp_path):
     """Return guides that swing without touching each other, and hair of these guides."""
-    swing(bpy.data.objects["Sphere"])
-    guides = bpy.data.objects["Guides"]
-    apart = {"hair_friction": 0.0, "hair_pressure": 0.0, "collides_with_surface": False, "sag_free": False}
-    simulate(guides, tmp_path, bend_stiffness=1.0, **apart)
-    return guides.data, hair.data
+    return simulate_apart(tmp_path).data, hair.data
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hair_addon.blender.groom.dynamics import frame_folders, guide_baking, guide
 from hair_addon.blender.live import dynamics_state
 from hair_addon.core.grooming.guide_tool_settings import DrapeSettings
 from hair_addon.core.long_work import run_now
-from tests.support.dynamics.swung import simulate, swing
+from tests.support.dynamics.swung import simulate_apart
 from tests.support.reading import points, write_points
 
 LAST = 6
@@ -19,11 +19,7 @@ LAST = 6
 @pytest.fixture
 def swung(hair, tmp_path):
     """Return guides that swing without touching each other."""
-    swing(bpy.data.objects["Sphere"])
-    guides = bpy.data.objects["Guides"]
-    apart = {"hair_friction": 0.0, "hair_pressure": 0.0, "collides_with_surface": False, "sag_free": False}
-    simulate(guides, tmp_path, bend_stiffness=1.0, **apart)
-    return guides
+    return simulate_apart(tmp_path)
 
 
 def paint(weight):
