@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces and cameras: Blender's data → arrays."""
 
+from contextlib import contextmanager
+
 import bmesh
 import bpy
 import numpy as np
@@ -21,6 +23,8 @@ _MOST_CORNERS = 100_000  # of a face: the time to triangulate a face grows faste
 
 # session_uid of a mesh object → last read (`Faces`, (C,) edges of its corners).
 faces_cache = Cache(capacity=64)
+
+_faces_read = None  # {(session_uid, counts) of a mesh: `Faces`} in `faces_read_once`
 
 _OF_CORNERS = {".corner_vert": "vertex_index", ".corner_edge": "edge_index"}  # attributes: properties of `mesh.loops`
 
@@ -160,13 +164,34 @@ def faces_of(mesh):
     return _faces_of_corners(mesh, corner_values(mesh, ".corner_vert"))
 
 
-def cached_faces(mesh_object, mesh):
+@contextmanager
+def faces_read_once():
+    """A context in which a single evaluation of a dependency graph is read: `cached_faces` reads each mesh once."""
+    global _faces_read
+    before, _faces_read = _faces_read, {}
+    try:
+        yield
+    finally:
+        _faces_read = before
+
+
+def cached_faces(mesh_object, mesh, is_own=True):
     """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
-    Reading the starts of polygons is the slowest part. With the same vertices and edges at corners and the same number
-    of polygons, the polygons are the same: the last edge of each leads back to its first vertex.
+    is_own: whether it is the only mesh of the object, not one that Geometry Nodes instance. Reading the starts of
+    polygons is the slowest part. With the same vertices and edges at corners and the same number of polygons, the
+    polygons are the same: the last edge of each leads back to its first vertex.
     """
-    uid, vertices = mesh_object.session_uid, corner_values(mesh, ".corner_vert")
+    if _faces_read is None or not is_own:
+        return _known_faces(mesh_object.session_uid, mesh)
+    key = mesh_object.session_uid, len(mesh.vertices), len(mesh.loops), len(mesh.polygons)
+    if key not in _faces_read:
+        _faces_read[key] = _known_faces(mesh_object.session_uid, mesh)
+    return _faces_read[key]
+
+
+def _known_faces(uid, mesh):
+    vertices = corner_values(mesh, ".corner_vert")
     edges, known = corner_values(mesh, ".corner_edge"), faces_cache.get(uid)
     if known is not None:
         faces, known_edges = known

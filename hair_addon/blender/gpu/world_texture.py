@@ -19,6 +19,7 @@ _MOST_TAPS = 32
 
 light_cache = Cache(capacity=1)  # World.key → _ImageLight
 studio_cache = Cache(capacity=8)  # StudioImage → the result of `environment.decompose`
+turned_cache = Cache(capacity=8)  # (StudioImage, axes as bytes) → the result of `environment.turned`
 
 
 @dataclass
@@ -50,7 +51,8 @@ def _light_of_studio(world):
     """`light_of` a studio light. Its lobes are found once, so that they turn with it."""
     even = replace(world, color=np.ones(3), to_image=np.eye(4))
     known = studio_cache.get(world.image, lambda: environment.decompose(_unrolled(even)))
-    lobes, sides = environment.turned(*known, world.to_image[:3, :3])
+    axes = world.to_image[:3, :3]
+    lobes, sides = turned_cache.get((world.image, axes.tobytes()), lambda: environment.turned(*known, axes))
     return [replace(lobe, irradiance=world.color * lobe.irradiance) for lobe in lobes], world.color * sides
 
 

@@ -115,6 +115,7 @@ OTHERS = (
     studio_lights.image_cache,
     studio_lights.texture_cache,
     world_texture.studio_cache,
+    world_texture.turned_cache,
     simulated_world.parts_cache,
     simulated_hair.played_cache,
     dynamics_state.state_cache,

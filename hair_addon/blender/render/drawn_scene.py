@@ -27,7 +27,16 @@ from ..gpu.programs import surface_programs, uniforms
 from ..gpu.shadows import ShadowMaps
 from ..host import running
 from ..host.notices import can_be_drawn
-from . import gpu_strands, hair_cache, hair_places, modified_hair, motion_vectors, read_strands, solid_hair
+from . import (
+    gpu_strands,
+    hair_cache,
+    hair_places,
+    light_paths,
+    modified_hair,
+    motion_vectors,
+    read_strands,
+    solid_hair,
+)
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -176,8 +185,11 @@ def read(
         # Scenes without hair cost nothing.
         return _EMPTY
     is_shaded, grown_on = viewport is None or not is_hair_only, _surface_uids(places)
-    if before is None or before.shadow_maps is None:
-        surroundings = _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, former is not None)
+    has_normals = is_shaded or _needing_normals(blender_scene, viewport, shown, grown_on, former is not None)
+    if before is None or before.shadow_maps is None or (has_normals is True and _lacks_normals(before)):
+        surroundings = _read_surroundings(
+            depsgraph, viewport, shown, is_shaded, grown_on, former is not None, has_normals
+        )
         world, lamps, maps = _world_of(shown.light, blender_scene, view_layer, viewport is None), None, None
     else:
         surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
@@ -215,15 +227,12 @@ def read(
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
 
 
-def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_played):
+def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_played, has_normals):
     """Return `_SURROUNDINGS` of a scene: its meshes on the GPU.
 
-    is_shaded: whether Vellus shades surfaces; grown_on: of `_surface_uids`; is_played: during playback; others: of
-    `read`.
+    is_shaded: whether Vellus shades surfaces; grown_on: of `_surface_uids`; is_played: during playback;
+    has_normals: as for `drawn_meshes.read_drawn_meshes`; others: of `read`.
     """
-    has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # for the shadow of hair on surfaces
-    if not has_normals and not shown.is_wire:
-        has_normals = grown_on
     meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_played, has_normals)
     if is_shaded:
         meshes = drawn_meshes.split_clear(meshes)
@@ -233,6 +242,22 @@ def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_playe
         below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
         surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
     return surroundings
+
+
+def _needing_normals(blender_scene, viewport, shown, grown_on, is_moving):
+    """Whether surfaces that Blender draws in a viewport need normals, or {session_uid} of those that do.
+
+    Normals are for shadows of hair on surfaces, and at rest for light paths. Blender computes them for each pose.
+    """
+    if viewport.shading.type != "MATERIAL":
+        return False if shown.is_wire else grown_on
+    has_paths = light_paths.path_count(blender_scene, (1, 1)) > 0 and not is_moving
+    return has_paths or blender_scene.vellus.has_preview_shadow
+
+
+def _lacks_normals(drawn):
+    """Whether surfaces of a `DrawnScene` were read without normals, as they moved."""
+    return any(blocker.source is not None and blocker.source.normals is None for blocker in drawn.blockers)
 
 
 def _surface_uids(places):

@@ -141,8 +141,9 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
             needs_normals = has_normals
             if not isinstance(has_normals, bool):
                 needs_normals = instance.object.original.session_uid in has_normals
-            bake = bakes.get(instance.object.original.session_uid) if _has_own_mesh(instance) else None
-            read_as = is_holdout, is_moving, needs_normals, override, has_uvs, bake
+            is_own = _has_own_mesh(instance)
+            bake = bakes.get(instance.object.original.session_uid) if is_own else None
+            read_as = is_holdout, is_moving, needs_normals, override, has_uvs, is_own, bake
             mesh = _read_drawn_mesh(instance.object, matrix, *read_as)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
             meshes.append(replace(mesh, owner=owner_of(instance), **rays))
@@ -233,11 +234,11 @@ def _some_parts(mesh, parts):
     )
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs, bake=None):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs, is_own, bake):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
-        layout = _layout(mesh_object, mesh, is_moving)
+        layout = _layout(mesh_object, mesh, is_moving, is_own)
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
         name = "" if mesh_object.original.data.is_editmode else name_of(mesh_object)
@@ -271,9 +272,9 @@ def _normals(mesh, layout, has_vertex_normals):
     return normals.take(layout.loops, axis=0)
 
 
-def _layout(mesh_object, mesh, is_moving):
+def _layout(mesh_object, mesh, is_moving, is_own):
     """Return the `_Layout` of an evaluated mesh; with `is_moving` the previous layout, if it fits."""
-    faces, slots = scene.cached_faces(mesh_object.original, mesh), np.zeros(0, np.int32)
+    faces, slots = scene.cached_faces(mesh_object.original, mesh, is_own), np.zeros(0, np.int32)
     if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ....core.errors import HairError
+from ...data import scene
 from ...data.pictures import viewport_shading
 from ...data.strands import curves_objects
 from ...gpu import drawing
@@ -197,18 +198,20 @@ def drawn_scene_of(context):
             view.drawn = _relit(context, unlit)
             return _lit(view, context, shading.light)
         view.is_playing = is_playing
-        view.drawn = drawn_scene.read(
-            context.scene,
-            context.view_layer,
-            context.evaluated_depsgraph_get(),
-            viewport,
-            hair_cache.refuse,
-            before=before,
-            is_draft=bindings.has_unwritten(),
-            is_hair_only=not is_ours(context),
-            former=former if is_playing else None,
-            shown=shading,
-        )
+        depsgraph = context.evaluated_depsgraph_get()
+        with scene.faces_read_once():
+            view.drawn = drawn_scene.read(
+                context.scene,
+                context.view_layer,
+                depsgraph,
+                viewport,
+                hair_cache.refuse,
+                before=before,
+                is_draft=bindings.has_unwritten(),
+                is_hair_only=not is_ours(context),
+                former=former if is_playing else None,
+                shown=shading,
+            )
         if view.drawn.hair:
             hair_cache.choose_makers()
     return _lit(view, context, shading.light)

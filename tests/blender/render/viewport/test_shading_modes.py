@@ -11,6 +11,7 @@ import pytest
 from hair_addon.blender.data.pictures import viewport_shading
 from hair_addon.blender.gpu import drawing, studio_lights
 from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.host import scene_time
 from hair_addon.blender.render import drawn_scene, scene_drawing, solid_hair
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.support.pictures.rendering import light_up
@@ -488,6 +489,34 @@ def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
     brightest = turned_light.lights["light"]["axis"][0, :3]
     # A direction turned by the rotation is the image's: light comes from the other side.
     np.testing.assert_allclose(brightest, turned(-0.4) @ suns[1][0, :3], atol=1e-4)
+
+
+def test_normals_of_surfaces_are_read_for_shadows_and_light_paths(ball, monkeypatch):
+    """In Material Preview normals, which Blender computes for each pose, are read for light paths at rest and for
+    shadows on surfaces; the scene at rest has them also after frames that were played.
+    """
+    ball.shading.type, ball.shading.use_scene_lights, ball.shading.use_scene_world = "MATERIAL", True, True
+    context, state, is_playing = context_of(ball), bpy.context.scene.vellus, [True]
+    monkeypatch.setattr(scene_time, "is_playing", lambda: is_playing[0])
+    corners, state.multiple_scattering = [], "GRID"
+
+    def have(is_new=True):
+        if is_new:
+            viewport.invalidate()
+        found = viewport.drawn_scene_of(context).blockers
+        corners.append(tuple(id(one.surface.corners) for one in found))
+        return [blocker.source.normals is not None for blocker in found]
+
+    have()
+    assert not any(have())
+    is_playing[0] = False
+    assert all(have(is_new=False))
+    assert all(have())
+    state.multiple_scattering = "DUAL"
+    assert not any(have())
+    state.has_preview_shadow = True
+    assert all(have())
+    assert len(set(corners)) == 1  # nothing else is uploaded again
 
 
 def test_an_hdri_that_follows_the_view_lights_the_same_side_of_the_screen(ball):
