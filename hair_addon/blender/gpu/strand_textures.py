@@ -6,6 +6,7 @@ Points take eight bytes each: core/geometry/packed_strands.py.
 A change uploads all strands, or only the moved strands; a redraw uploads nothing.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -57,7 +58,7 @@ class StrandsOnGPU:
     wetness_here: np.ndarray | None  # (S,) on the CPU
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
-    bounds: np.ndarray  # (2, 3): least and greatest coordinates
+    read_bounds: Callable[[], np.ndarray]  # returns `bounds`; may wait for the GPU
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
@@ -77,6 +78,11 @@ class StrandsOnGPU:
         own = [self.texture, self.radii_texture, self.randoms]
         own += [one for one in (self.wetness, self.looks, self.radial) if one is not None]
         return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """(2, 3): least and greatest coordinates; waits until the GPU has made the strands."""
+        return self.read_bounds()
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
@@ -123,7 +129,7 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
         wetness,
         points,
         radii,
-        bounds,
+        lambda: bounds,
         _mean_length(points),
         float(radii[_some(strand_count)].mean()),
         float(radii.max()),
@@ -139,7 +145,7 @@ def with_points(strands, points):
         strands,
         texture=texture,
         points=points,
-        bounds=bounds,
+        read_bounds=lambda: bounds,
         mean_length=_mean_length(points),
         moved=None,
         is_made=False,

@@ -58,7 +58,7 @@ STAGES = {
     "fill": (StrandMaker, "fill_some"),
     "styles": (StyleMaker, "_style"),
     "carry": (StrandCarrier, "carry"),
-    "bounds": (StrandBounds, "read"),
+    "bounds": (StrandBounds, "_read"),
     "pose": (hair_cache, "_pose_of"),
     "hair read": (drawn_scene, "_read_hair"),
     "meshes": (drawn_scene.drawn_meshes, "read_drawn_meshes"),

@@ -4,7 +4,9 @@
 Compute programs of every backend support it: neither atomics nor shared memory is needed.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import gpu
@@ -33,8 +35,10 @@ class StrandBounds:
         """Texture of the box of each strand: two texels each, with as many per row as fit."""
         return self.levels[0][0]
 
-    def read(self) -> np.ndarray:
-        """Return (2, 3) float32 least and greatest coordinates; waits until the strands are made."""
+    def joined(self) -> Callable[[], np.ndarray]:
+        """Join the boxes of strands; returns a function that reads the result once: (2, 3) float32 least and greatest
+        coordinates. Reading waits until the strands are made.
+        """
         program = _join_program()
         program.bind()
         program.uniform_int("share", self.share)
@@ -45,6 +49,9 @@ class StrandBounds:
             program.uniform_int("joined_count", joined_count)
             gpu.compute.dispatch(program, -(-joined_count // _GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
+        return cache(self._read)
+
+    def _read(self):
         return np.array(self.levels[-1][0].read(), np.float32).reshape(_BOX, 4)[:, :3]
 
 

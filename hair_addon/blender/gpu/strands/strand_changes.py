@@ -39,14 +39,19 @@ class StrandChanges:
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """Return `strands` as the program leaves them, with exact bounds; waits until the program has run."""
+        """Return `strands` as the program leaves them, with exact bounds, which wait until the program has run.
+
+        They are read when they are first needed, so the GPU runs the programs of all hair while the CPU reads the rest
+        of the scene.
+        """
         before = strands.moved.turn if strands.moved else 0
         if self.row_moved:
             moved = Moved(self.moved, self.row_moved, self.moved_rows, before + 1)
         else:
             # Former points are unknown: counted like more than one change.
             moved = Moved(self.moved, 1, self.moved_rows, before + 2)
-        return replace(strands, moved=moved, bounds=self.bounds.read(), is_made=True, has_points=False, has_bends=False)
+        flags = {"is_made": True, "has_points": False, "has_bends": False}
+        return replace(strands, moved=moved, read_bounds=self.bounds.joined(), **flags)
 
 
 def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:

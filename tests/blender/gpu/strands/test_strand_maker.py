@@ -112,7 +112,7 @@ def test_joined_boxes_hold_all_boxes(blender, rng, count):
     boxes = rng.normal(size=(-(-count // in_row) * in_row, 2, 4)).astype(np.float32)
     texels = gpu.types.Buffer("FLOAT", boxes.size, boxes.ravel())
     texture = gpu.types.GPUTexture((2 * in_row, len(boxes) // in_row), format="RGBA32F", data=texels)
-    found = replace(bounds, levels=((texture, count), *bounds.levels[1:])).read()
+    found = replace(bounds, levels=((texture, count), *bounds.levels[1:])).joined()()
     np.testing.assert_array_equal(found, [boxes[:count, 0, :3].min(axis=0), boxes[:count, 1, :3].max(axis=0)])
 
 
@@ -164,6 +164,20 @@ def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
     assert len(made) == 3
     assert buffers == [GUIDES * 9 * 3] * 3
     assert len(shaders.program_cache) == programs
+
+
+def test_bounds_are_read_once_they_are_needed(blender, rng, monkeypatch):
+    """Making strands waits for no program of the GPU: the first use of their bounds does, once."""
+    binding, guides = bound_hair(rng, 9, 4)
+    maker, reads, read = new_maker(binding, 9, np.eye(3)), [], strand_bounds.StrandBounds._read
+    monkeypatch.setattr(strand_bounds.StrandBounds, "_read", lambda self: reads.append(0) or read(self))
+    made = maker.make(uploaded(by_warp(binding, guides, np.eye(3))), guides.numpy())
+    again = replace(made, has_bends=True)
+    assert not reads
+    places = drawn_strands.places(made).reshape(-1, 3)
+    for shown in (again, made):
+        np.testing.assert_allclose(shown.bounds, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=1e-4)
+    assert len(reads) == 1
 
 
 def test_other_guides_or_strands_are_refused(blender, rng):
