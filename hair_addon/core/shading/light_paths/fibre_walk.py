@@ -73,34 +73,66 @@ def logistic_part(scale: float):
     return 1.0 / (1.0 + wp.exp(PI / scale))
 
 
+@wp.struct
+class Between:
+    """The parts of `value` that are the same for all offsets; angle: between the directions around the fiber [rad];
+    along: `longitudinal` of each lobe; around: factor of the azimuthal logistic.
+    """
+
+    sin_o: float
+    cos_o: float
+    angle: float
+    along: wp.vec4
+    around: float
+
+
+@wp.func
+def between(fibre: Fibre, viewer: wp.vec3, light: wp.vec3):
+    """Return `Between` of the directions to the viewer and the light, unit vectors from the fiber."""
+    found = Between()
+    sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
+    sin_i = wp.clamp(wp.dot(fibre.tangent, light), -_STEEPEST, _STEEPEST)
+    found.sin_o = sin_o
+    found.cos_o = wp.sqrt(1.0 - sin_o * sin_o)
+    x = wp.normalize(viewer - sin_o * fibre.tangent)
+    found.angle = wp.atan2(wp.dot(light, wp.cross(fibre.tangent, x)), wp.dot(light, x))
+    for path in range(4):
+        shift, v = lobe(path, fibre)
+        found.along[path] = longitudinal(sin_i, sin_o, shift, v)
+    found.around = 1.0 / (fibre.scale * (1.0 - 2.0 * logistic_part(fibre.scale)))
+    return found
+
+
+@wp.func
+def value_at(fibre: Fibre, pair: Between, h: float, weight: wp.vec3):
+    """Return `value` at an offset h."""
+    fresnel = reflectance(pair.cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
+    crossing = transmittance(h, pair.sin_o, pair.cos_o, fibre.eta, fibre.sigma_a)
+    gamma = wp.asin(h)
+    total = wp.vec3(0.0, 0.0, 0.0)
+    of_all = float(0.0)
+    for path in range(4):
+        part = pair.along[path]
+        if path == _RESIDUAL:
+            part = part / (2.0 * PI)
+        else:
+            turned = pair.angle - exit_angle(path, h, gamma, pair.sin_o, pair.cos_o, fibre.eta)
+            turned = turned - 2.0 * PI * wp.floor(turned / (2.0 * PI) + 0.5)
+            e = wp.exp(-wp.abs(turned) / fibre.scale)
+            part = part * pair.around * e / ((1.0 + e) * (1.0 + e))
+        left = attenuation(path, fresnel, crossing)
+        total += part * left
+        of_all += wp.dot(weight, left)
+    return total, wp.dot(weight, total) / wp.max(of_all, 1e-30)
+
+
 @wp.func
 def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float, weight: wp.vec3):
     """Return (radiance towards the viewer for unit irradiance from the light, density [1/sr] with which `turn` samples
     the light's direction for a path of this weight); viewer, light: unit vectors from the fiber.
     """
-    sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
-    sin_i = wp.clamp(wp.dot(fibre.tangent, light), -_STEEPEST, _STEEPEST)
-    cos_o = wp.sqrt(1.0 - sin_o * sin_o)
-    x = wp.normalize(viewer - sin_o * fibre.tangent)
-    phi = wp.atan2(wp.dot(light, wp.cross(fibre.tangent, x)), wp.dot(light, x))
-    fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
-    crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
-    total = wp.vec3(0.0, 0.0, 0.0)
-    of_all = float(0.0)
-    for path in range(4):
-        shift, v = lobe(path, fibre)
-        part = longitudinal(sin_i, sin_o, shift, v)
-        if path == _RESIDUAL:
-            part = part / (2.0 * PI)
-        else:
-            turned = phi - exit_angle(path, h, wp.asin(h), sin_o, cos_o, fibre.eta)
-            turned = turned - 2.0 * PI * wp.floor(turned / (2.0 * PI) + 0.5)
-            e = wp.exp(-wp.abs(turned) / fibre.scale)
-            part = part * e / (fibre.scale * (1.0 + e) * (1.0 + e) * (1.0 - 2.0 * logistic_part(fibre.scale)))
-        left = attenuation(path, fresnel, crossing)
-        total += part * left
-        of_all += wp.dot(weight, left)
-    return total, wp.dot(weight, total) / wp.max(of_all, 1e-30)
+    found, density = value_at(fibre, between(fibre, viewer, light), h, weight)
+    return found, density
 
 
 @wp.func

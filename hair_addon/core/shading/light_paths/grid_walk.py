@@ -227,10 +227,14 @@ def _trace_cell(
     position: wp.vec3,
     direction: wp.vec3,
     own: int,
+    is_any: int,
     end: float,
     hit: Hit,
 ):
-    """Return (distance, `Hit`) of the nearest segment of a cell before `end`; the arguments if there is none."""
+    """Return (distance, `Hit`) of the nearest segment of a cell before `end`; the arguments if there is none.
+
+    is_any: one to stop at any hit, whose distance is returned as zero.
+    """
     for turn in range(medium.starts[index], medium.starts[index + 1]):
         if _comes_near(medium, turn, position - centre, side, direction):
             segment = medium.segments[turn]
@@ -241,6 +245,9 @@ def _trace_cell(
                     hit.kind = STRAND
                     hit.index = segment
                     hit.offset = offset
+                    if is_any > 0:
+                        end = 0.0
+                        break
     return end, hit
 
 
@@ -255,6 +262,7 @@ def _trace_brick(
     direction: wp.vec3,
     inverse: wp.vec3,
     own: int,
+    is_any: int,
     end: float,
     hit: Hit,
 ):
@@ -272,7 +280,7 @@ def _trace_brick(
         to_cell = wp.min(leave[0], wp.min(leave[1], leave[2]))
         centre = corner + side * wp.vec3(float(cell[0]) + 0.5, float(cell[1]) + 0.5, float(cell[2]) + 0.5)
         index = ((brick * along + cell[2]) * along + cell[1]) * along + cell[0]
-        end, hit = _trace_cell(medium, index, centre, side, position, direction, own, end, hit)
+        end, hit = _trace_cell(medium, index, centre, side, position, direction, own, is_any, end, hit)
         if to_cell >= wp.min(end, to):
             staying = 0
         for axis in range(3):
@@ -285,7 +293,7 @@ def _trace_brick(
 
 
 @wp.func
-def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, hit: Hit):
+def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: int, most: float, is_any: int, hit: Hit):
     """Return `_trace_cell` of all cells of the grid."""
     end = float(most)
     inverse = _inverse_of(direction)
@@ -302,7 +310,9 @@ def _trace_strands(medium: Medium, position: wp.vec3, direction: wp.vec3, own: i
         if brick >= 0:
             corner = medium.corner + medium.voxel * wp.vec3(float(voxel[0]), float(voxel[1]), float(voxel[2]))
             until = wp.min(to, last)
-            end, hit = _trace_brick(medium, brick, corner, here, until, position, direction, inverse, own, end, hit)
+            end, hit = _trace_brick(
+                medium, brick, corner, here, until, position, direction, inverse, own, is_any, end, hit
+            )
         if to >= wp.min(end, last):
             going = 0
         here = to
@@ -320,7 +330,7 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
     """Return the `Hit` of a ray within a distance [m]; own: the strand that the ray leaves, -1: none."""
     hit = Hit()
     hit.kind = PASSED
-    end, hit = _trace_strands(medium, position, direction, own, most, hit)
+    end, hit = _trace_strands(medium, position, direction, own, most, 0, hit)
     # Surfaces behind the strand do not matter.
     if medium.has_mesh > 0:
         found = wp.mesh_query_ray(medium.mesh, position, direction, end)
@@ -333,6 +343,19 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
                 hit.normal = -hit.normal
     hit.position = position + direction * end
     return hit
+
+
+@wp.func
+def is_blocked(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
+    """Whether `walk` would hit anything."""
+    hit = Hit()
+    hit.kind = PASSED
+    _end, hit = _trace_strands(medium, position, direction, own, most, 1, hit)
+    if hit.kind != PASSED:
+        return True
+    if medium.has_mesh > 0:
+        return wp.mesh_query_ray_anyhit(medium.mesh, position, direction, most)
+    return False
 
 
 @wp.func

@@ -8,8 +8,8 @@ neither lamps near a strand nor narrow lobes give few paths much light.
 
 import warp as wp
 
-from .fibre_walk import Fibre, value
-from .grid_walk import PASSED, Hit, Medium, walk
+from .fibre_walk import Fibre, between, value, value_at
+from .grid_walk import PASSED, Hit, Medium, is_blocked
 from .light_sources import Lit, Sources, choose, lit_by, lit_by_world, lit_from
 from .surface_walk import Surface, surface_value
 from .world_light import world_density, world_radiance
@@ -56,8 +56,7 @@ def _is_shadowed(medium: Medium, lit: Lit, here: Event):
     """Whether an event is in the shadow of a lamp."""
     if lit.casts_shadow == 0:
         return False
-    hit = walk(medium, here.position, lit.direction, lit.distance, here.own)
-    return hit.kind != PASSED
+    return is_blocked(medium, here.position, lit.direction, lit.distance, here.own)
 
 
 @wp.func
@@ -112,9 +111,9 @@ def _scattered(here: Event, lit: Lit, shift: float):
         light, density = surface_value(here.surface, lit.direction, here.weight)
         light = wp.cw_mul(here.weight, wp.cw_mul(lit.irradiance, light)) * (lit.density / (lit.density + density))
     else:
+        pair = between(here.fibre, here.facing, lit.direction)
         for step in range(_OFFSETS_AT_ONCE):
-            h = _offset_at(here, step, shift)
-            found, density = value(here.fibre, here.facing, lit.direction, h, here.weight)
+            found, density = value_at(here.fibre, pair, _offset_at(here, step, shift), here.weight)
             light += found * (lit.density / (lit.density + density))
         light = wp.cw_mul(here.weight, wp.cw_mul(lit.irradiance, light / float(_OFFSETS_AT_ONCE)))
     return light

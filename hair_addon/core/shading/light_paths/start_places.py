@@ -14,7 +14,7 @@ import warp as wp
 
 from ...kernels import kernel_cache, running_sums
 from ...kernels.checks import require_count
-from .grid_walk import PASSED, STRAND, Hit, Medium, place_on, walk
+from .grid_walk import STRAND, Hit, Medium, is_blocked, place_on, walk
 from .media import launch
 from .seen_rays import Seen
 from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
@@ -57,8 +57,7 @@ def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Hit, direction: wp.v
         return False
     # Places are mostly hidden by the next strand, which a short ray from here hits.
     own = medium.strands[place.index]
-    before = walk(medium, place.position, -direction, reach, own)
-    if before.kind != PASSED:
+    if is_blocked(medium, place.position, -direction, reach, own):
         return False
     # A place inside another strand is hidden by that strand's side, which rays from inside do not hit.
     radius = medium.radii[place.index]

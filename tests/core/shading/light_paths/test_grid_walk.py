@@ -6,7 +6,16 @@ import pytest
 import warp as wp
 
 from hair_addon.core.shading.light_paths import media
-from hair_addon.core.shading.light_paths.grid_walk import FAR, STRAND, SURFACE, Medium, crossing, walk
+from hair_addon.core.shading.light_paths.grid_walk import (
+    FAR,
+    PASSED,
+    STRAND,
+    SURFACE,
+    Medium,
+    crossing,
+    is_blocked,
+    walk,
+)
 from hair_addon.core.shading.light_paths.strand_cells import LINE_ERROR, line_from, line_of
 from tests.core.shading.light_paths.test_gather import WHITE, grid_of
 
@@ -26,9 +35,11 @@ def _by_walking(
     out_kind: wp.array[int],
     out_distance: wp.array[float],
     out_segment: wp.array[int],
+    out_is_blocked: wp.array[int],
 ):
     ray = wp.tid()
     hit = walk(medium, places[ray], directions[ray], most, own[ray])
+    out_is_blocked[ray] = int(is_blocked(medium, places[ray], directions[ray], most, own[ray]))
     out_kind[ray] = hit.kind
     out_distance[ray] = wp.length(hit.position - places[ray])
     out_segment[ray] = hit.index
@@ -89,15 +100,16 @@ def test_the_nearest_segment_is_found(rng, voxel_count):
         medium = media.medium_of(grid, None, np.zeros((0, 3)), np.zeros((0, 3)))
         given = [medium, wp.array(places, dtype=wp.vec3), wp.array(directions, dtype=wp.vec3)]
         numbers = wp.array(own, dtype=int)
-        found = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int)]
+        found = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int, int)]
         wp.launch(_by_walking, RAYS, [*given, FAR, numbers], found)
         expected = [wp.zeros(RAYS, dtype=kind) for kind in (float, int)]
         wp.launch(_by_all_segments, RAYS, [*given, numbers], expected)
-    kinds, distances, segments = (array.numpy() for array in found)
+    kinds, distances, segments, blocked = (array.numpy() for array in found)
     nearest, nearest_segments = (array.numpy() for array in expected)
     is_met = nearest_segments >= 0
     assert 0.2 < is_met.mean() < 0.9
     assert ((kinds == STRAND) == is_met).all()
+    assert (blocked == is_met).all()
     assert (segments[is_met] == nearest_segments[is_met]).mean() > 0.999  # two that cross are as near
     assert np.abs(distances - nearest)[is_met].max() < 1e-5
 
@@ -110,12 +122,14 @@ def test_strands_hide_a_wall_and_it_hides_them(rng):
         mesh = media.mesh_of(WALL)
         rows = [wp.array(values, dtype=wp.vec3) for values in (places, directions)]
         own, found = wp.full(RAYS, -1, dtype=int), []
-        for wall, count in ((mesh, 1), (None, 0)):
+        for wall, count, most in ((mesh, 1, FAR), (None, 0, FAR), (mesh, 1, 0.3)):
             medium = media.medium_of(grid, wall, np.zeros((3 * count, 3)), np.zeros((count, 3)))
-            arrays = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int)]
-            wp.launch(_by_walking, RAYS, [medium, *rows, FAR, own], arrays)
+            arrays = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int, int)]
+            wp.launch(_by_walking, RAYS, [medium, *rows, most, own], arrays)
             found.append([array.numpy() for array in arrays])
-    (kinds, distances, _), (without, strands_at, _) = found
+    (kinds, distances, *_), (without, strands_at, *_), _near = found
+    for met, *_places, blocked in found:
+        assert ((met != PASSED) == blocked).all()
     with np.errstate(divide="ignore", invalid="ignore"):
         to_wall = (0.4 - places[:, 1]) / directions[:, 1]
     at = places + np.where(np.isfinite(to_wall), to_wall, 0.0)[:, None] * directions
