@@ -108,9 +108,14 @@ def _gather(
             if event < _MOST_EVENTS:
                 hit = walk(medium, here.position, direction, _FAR, here.own)
                 light_there, lamp_state = light_at_hit(medium, sources, here, direction, hit, lamp_state)
-                light += wp.cw_mul(weight, light_there)
+                found = wp.cw_mul(weight, light_there)
+                light += found
                 if hit.kind == PASSED and sources.world.is_uneven == 0:
-                    of_world += wp.cw_mul(weight, world_radiance(sources.world, direction))
+                    from_world = wp.cw_mul(weight, world_radiance(sources.world, direction))
+                    of_world += from_world
+                    found -= from_world
+                if event == 1:
+                    at_once += found
     out_light[path] = light
     out_at_once[path] = at_once
     out_later[path] = light - at_once - of_world

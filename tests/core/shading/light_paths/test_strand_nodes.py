@@ -117,6 +117,18 @@ def test_parts_of_light_are_all_of_it(rng):
     assert all(parts.numpy()[..., 6 * part : 6 * part + 3].sum() > 0.0 for part in range(3))
 
 
+def test_a_lone_strand_has_no_later_light():
+    """A lamp lights it at once, also by paths that leave the strand toward the lamp."""
+    grid = grid_of(np.linspace((-0.1, 0.0, -0.5), (0.1, 0.0, 0.5), 4)[None], WHITE, radius=0.05, voxel_count=30)
+    lamps = sun((0.0, 1.0, 0.0))
+    lamps["radius"] = 0.5
+    light = surroundings(lamps=lamps, world=0.3)
+    sums = gather.gather(grid, light, seen_rays.seen_by(grid, light.corners, ALONG_Y, 2000), 1000)
+    at_once, later, of_world = (sums._parts.of_systems()[0].numpy()[..., at : at + 3].sum() for at in (0, 6, 12))
+    assert at_once > 0.0 and of_world > 0.0
+    assert abs(later) < 1e-5 * at_once
+
+
 def test_texels_contain_voxels_and_nodes(rng):
     """The texels of nodes are where shaders/light/light_grid.glsl looks for them, and the last is their number."""
     voxels = rng.random((3, 5, 22, 4)).astype(np.float32)
