@@ -12,7 +12,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.host import memory, notices, running
-from hair_addon.blender.live import handlers
+from hair_addon.blender.live import evaluation
 from hair_addon.blender.ui.operators.base import modal
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import cost
@@ -95,7 +95,7 @@ def test_what_hair_has_already_is_not_asked_for_again(hair, free, monkeypatch):
     free(0.4)
     state.hair.strand_count = 10_000
     with memory.asking():
-        handlers._evaluate(bpy.context.evaluated_depsgraph_get(), {})
+        evaluation.evaluate(bpy.context.evaluated_depsgraph_get(), {})
     assert "% of the free memory: use fewer, or click Regenerate Strands" in state.status
     assert len(hair.data.curves) == 500
     monkeypatch.setattr(running, "has_window", lambda: False)
@@ -105,7 +105,7 @@ def test_what_hair_has_already_is_not_asked_for_again(hair, free, monkeypatch):
     assert len(hair.data.curves) == 10_000 and state.status == ""
     state.hair.tip_taper = 0.5
     with memory.asking():
-        handlers._evaluate(bpy.context.evaluated_depsgraph_get(), {})
+        evaluation.evaluate(bpy.context.evaluated_depsgraph_get(), {})
     assert state.status == ""
 
 

@@ -125,12 +125,12 @@ def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
     first = drawn(watched)
     rests, rest = [], style_maker.StyleMaker.rest
-    monkeypatch.setattr(style_maker.StyleMaker, "rest", lambda self: rests.append(self) or rest(self))
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
         counted.setattr(following, "strands_now", None)
         slide(watched, 1, "radius", 0.03)
         drawn(watched)
+        monkeypatch.setattr(style_maker.StyleMaker, "rest", lambda self: rests.append(self) or rest(self))
         slide(watched, 0, "amount", 0.4)
         comb(3)  # and combing goes on from there
         shown = drawn(watched)
