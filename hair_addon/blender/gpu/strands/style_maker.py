@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import gpu
 import numpy as np
 
+from ....core.errors import HairError
 from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count
 from ....core.styling import kinds, style_text
@@ -83,6 +84,7 @@ class StyleMaker:
     _before: "Styling | None" = field(default=None, init=False)
     _same_before: int = field(default=0, init=False)
     _contained: int | None = field(default=None, init=False)  # steps whose results `plain` contains; None: nothing
+    _lacks_memory: bool = field(default=False, init=False)  # whether the driver refused strands between styles
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
@@ -119,7 +121,7 @@ class StyleMaker:
         """Release the memory for strands between styles, as no slider moves."""
         if len(self.plain) > 1:
             self.plain, self._contained = self.plain[:1], None
-        self._same_before = 0
+        self._same_before, self._lacks_memory = 0, False
 
     def _same_as(self, before):
         """Return (whether all clump centers are those of other styles, the number of first steps whose results are).
@@ -162,10 +164,14 @@ class StyleMaker:
         """Whether each part of the strands has its texture, which is created here unless memory would not suffice."""
         firsts, point_count = range(0, strand_count, MOST_AT_ONCE), self.styling.point_count
         if len(self.plain) < len(firsts):
-            if strand_count * point_count > MOST_KEPT:
+            if self._lacks_memory or strand_count * point_count > MOST_KEPT:
                 return False
             counts = [min(MOST_AT_ONCE, strand_count - first) for first in firsts]
-            more = [strand_changes.empty_rows(count, point_count)[0] for count in counts[len(self.plain) :]]
+            try:
+                more = [strand_changes.empty_rows(count, point_count)[0] for count in counts[len(self.plain) :]]
+            except HairError:  # hair can be made without this memory
+                self._lacks_memory = True
+                return False
             self.plain = [*self.plain, *more]
         return True
 

@@ -303,6 +303,29 @@ def test_styles_above_a_slider_are_not_applied_again(hair, slid):
     assert make(*frizzed[1]) == ["fill", (0,)]
 
 
+def test_a_slider_needs_no_memory_that_the_driver_lacks(slid, monkeypatch):
+    """Without memory for strands between styles, all styles are applied again."""
+    make, makers = slid
+    frizzed = [(*SLID[:3], replace(SLID[3], amplitude=value)) for value in (0.002, 0.003, 0.004)]
+    make(*SLID)
+    held, asked, made_here = strand_textures.bytes_of(makers[-1].textures), [], style_maker.StyleMaker.make
+
+    def lacking(*_size, **_given):
+        asked.append(1)
+        raise MemoryError
+
+    def make_without_memory(*given):
+        with monkeypatch.context() as refusing:
+            refusing.setattr(gpu.types, "GPUTexture", lacking)
+            return made_here(*given)
+
+    monkeypatch.setattr(style_maker.StyleMaker, "make", make_without_memory)
+    for styles in frizzed:
+        assert make(*styles) == ["fill", (0,)]
+    assert len(asked) == 1  # the driver is not asked again
+    assert strand_textures.bytes_of(makers[-1].textures) == held
+
+
 def test_steps_are_the_same_up_to_what_a_map_changes(hair, varied):
     """Steps count as the same as long as they read the same masks, numbers and clump centers of strands."""
     styles = (clump.Settings(size=0.04), curl.Settings(), frizz.Settings(), trim.Settings(factor=0.8))
