@@ -24,34 +24,52 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
     carried = set()  # guides without Auto Update that have followed
     in_place = set()  # hair that an applied transform has left in place
     for guides in bpy.data.hair_curves:
-        state = guides.vellus
         if guides.surface != surface_object or not _is_carried(guides):
             continue
-        try:
-            place = reported.place_before(guides)
-            followed = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
-            was_edited = followed is not Followed.NOTHING
-            if was_edited:
-                _strands_carried(guides)
-            if not state.is_live:
-                state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
-                carried |= {guides} if was_edited else set()
-                continue
-            # Masks limit its roots. Weights on another frame's faces cannot be compared.
-            is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
-            if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
-                state.is_stale = True
-            elif was_edited and is_placed and kept_densities.have_other_number(guides, depsgraph):
-                state.is_stale = True
-        except HairError as error:
-            state.status = str(error)
+        followed = _carry_guides(guides, depsgraph, is_mesh_edited)
+        if followed is Followed.NOTHING:
             continue
-        if was_edited:
-            redrawn = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
-            mark_followers(guides, redrawn)
-            in_place |= redrawn
+        if not guides.vellus.is_live:
+            carried.add(guides)
+            continue
+        redrawn = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
+        mark_followers(guides, redrawn)
+        in_place |= redrawn
     edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
-    for hair in bpy.data.hair_curves if is_mesh_edited else ():
+    if is_mesh_edited:
+        _follow_edited_mesh(surface_object, depsgraph, carried, in_place)
+
+
+def _carry_guides(guides, depsgraph, is_mesh_edited):
+    """Move guides with their surface, and mark them if their masks or their number differ; returns `Followed`.
+
+    Errors become the guides' status.
+    """
+    state = guides.vellus
+    try:
+        place = reported.place_before(guides)
+        followed = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
+        was_edited = followed is not Followed.NOTHING
+        if was_edited:
+            _strands_carried(guides)
+        if not state.is_live:
+            state.is_stale = state.is_stale or (is_mesh_edited and not was_edited)
+            return followed
+        # Masks limit its roots. Weights on another frame's faces cannot be compared.
+        is_placed = not (curves.is_hand_made(guides) or frame_faces.are_others(guides))
+        if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
+            state.is_stale = True
+        elif was_edited and is_placed and kept_densities.have_other_number(guides, depsgraph):
+            state.is_stale = True
+    except HairError as error:
+        state.status = str(error)
+        return Followed.NOTHING
+    return followed
+
+
+def _follow_edited_mesh(surface_object, depsgraph, carried, in_place):
+    """Mark hair whose surface has other weights or partings; carried and in_place: of `follow_surface`."""
+    for hair in bpy.data.hair_curves:
         state = hair.vellus
         if curves.grown_on(hair) != surface_object or state.kind != "HAIR":
             continue
