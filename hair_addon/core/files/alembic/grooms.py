@@ -215,26 +215,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
 
     is_guide, groups, names = of_all("groom_guide"), of_all("groom_group_id"), parameters.values("groom_group_name", "")
     of_each = np.array(names, object)[kept] if names and len(names) == file_count else None
-    ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
-    guide_ids, weights = (
-        of_curves("groom_closest_guides", "iu", GUIDE_SLOTS),
-        of_curves("groom_guide_weights", "f", GUIDE_SLOTS),
-    )
-    has_map = guide_ids is not None and weights is not None
-    whole = CurveSet(
-        curves.name,
-        curves.points,
-        curves.counts,
-        curves.is_smooth,
-        curves.radii,
-        group_name=names[0] if names else "",
-        ids=None if ids is None else ids.astype(np.int32),
-        root_uvs=None if uvs is None else uvs.astype(np.float32),
-        guide_ids=guide_ids.astype(np.int32) if has_map else None,
-        guide_weights=weights.astype(np.float32) if has_map else None,
-        colors=curves.colors,
-        motion=curves.motion,
-    )
+    whole = _with_attributes(curves, of_curves, names[0] if names else "")
     if is_guide is None and groups is None:
         yield whole
         return
@@ -245,3 +226,25 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
         name = whole.group_name if of_each is None else of_each[chosen][0]
         is_of_guides = None if is_guide is None else guide != 0
         yield replace(whole.some(chosen), is_guide=is_of_guides, group_id=group, group_name=name)
+
+
+def _with_attributes(curves, of_curves, group_name):
+    """Return curves with their IDs, root UVs and guides; of_curves(name, kind, width): a parameter or None."""
+    ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
+    guide_ids = of_curves("groom_closest_guides", "iu", GUIDE_SLOTS)
+    weights = of_curves("groom_guide_weights", "f", GUIDE_SLOTS)
+    has_map = guide_ids is not None and weights is not None
+    return CurveSet(
+        curves.name,
+        curves.points,
+        curves.counts,
+        curves.is_smooth,
+        curves.radii,
+        group_name=group_name,
+        ids=None if ids is None else ids.astype(np.int32),
+        root_uvs=None if uvs is None else uvs.astype(np.float32),
+        guide_ids=guide_ids.astype(np.int32) if has_map else None,
+        guide_weights=weights.astype(np.float32) if has_map else None,
+        colors=curves.colors,
+        motion=curves.motion,
+    )
