@@ -132,13 +132,7 @@ def using_as_guides(
     """
     every = grooming.rooted_curves.checked_every(every)
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
-    require_usable(curves_object, surface_object)
-    curves_objects.store_rest_positions(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
-    seen = foreign_curves.read(curves_object, applies_modifiers)
-    if len(seen.starts) < 2:
-        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
-    to_surface = surface_space.between(curves_object, surface_object)
+    surface, seen, to_surface = open_curves(curves_object, surface_object, depsgraph, applies_modifiers)
     is_unmasked = hair_settings is not None and not masks.own(hair_settings)
     grow = None if hair_settings is None else pipeline.hair_between(surface_object, surface, hair_settings, depsgraph)
     place, its_surface, device = Remembered(curves_object), Remembered(surface_object), preferences.device()
@@ -162,6 +156,22 @@ def using_as_guides(
         _bind_to_group(bound, datablock.surface, surface, guides.rooted.roots)
     hair = None if bound is None else pipeline.write_between(datablock, bound)
     return HandMade(datablock, hair, guides.rooted)
+
+
+def open_curves(
+    curves_object: Object, surface_object: Object, depsgraph: Depsgraph, applies_modifiers: bool
+) -> tuple[Surface, SeenCurves, Affine]:
+    """Return a surface, the curves of an object, and the `Affine` from their coordinates to the surface's.
+
+    applies_modifiers: as of `using_as_guides`. Raises `HairError`, also for an object without curves.
+    """
+    require_usable(curves_object, surface_object)
+    curves_objects.store_rest_positions(surface_object)
+    surface = scene.read_surface(surface_object, depsgraph)
+    seen = foreign_curves.read(curves_object, applies_modifiers)
+    if len(seen.starts) < 2:
+        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
+    return surface, seen, surface_space.between(curves_object, surface_object)
 
 
 def require_usable(curves_object: Object, surface_object: Object) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ....core import geometry, grooming
-from ....core.errors import HairError
 from ....core.geometry import strands
 from ....core.grooming import groom, groom_defaults
 from ....core.grooming.derived_guides import DerivationSettings, DerivedGuides
@@ -21,11 +20,10 @@ from ....core.grooming.groom import HairSettings
 from ....core.grooming.rooted_curves import RootedCurves
 from ....core.long_work import Work, part_of
 from ....core.params import Param, declared, plain_value
-from ...data import scene, surface_space, thin_hair, whole_changes
-from ...data.strands import attributes, curves, curves_objects, exported_curves, kept_shapes
+from ...data import surface_space, thin_hair, whole_changes
+from ...data.strands import attributes, curves, exported_curves, kept_shapes
 from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
-from ...host.notices import name_of
 from ...materials import looks
 from ...settings import setting_properties
 from .. import pipeline, staleness, writing
@@ -72,13 +70,9 @@ def using_as_hair(
     """
     applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
-    hand_made_guides.require_usable(curves_object, surface_object)
-    curves_objects.store_rest_positions(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
-    seen = foreign_curves.read(curves_object, applies_modifiers)
-    if len(seen.starts) < 2:
-        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
-    to_surface = surface_space.between(curves_object, surface_object)
+    surface, seen, to_surface = hand_made_guides.open_curves(
+        curves_object, surface_object, depsgraph, applies_modifiers
+    )
     place, its_surface = Remembered(curves_object), Remembered(surface_object)
     given = None if guides_object is None else _given_guides(guides_object, surface_object)
     its_guides = None if guides_object is None else Remembered(guides_object)
