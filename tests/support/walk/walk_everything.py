@@ -4,32 +4,26 @@
 python -m tests.support.walk.walk_everything RUNS OPERATIONS SEED
 """
 
-import faulthandler
 import gc
 import random
-import sys
 from pathlib import Path
 
 import bpy
-import gpu
 import numpy as np
-import pytest
 import warp as wp
 from hypothesis import strategies as st
 from hypothesis.stateful import invariant
 
-import hair_addon
 from hair_addon.blender.data.strands import curves as curve_data
 from hair_addon.blender.host import running
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import animated, style_keys
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import Settings
-from tests.support import invariants, rooted
+from tests.support import rooted
 from tests.support.invariants import activate, changed, chosen, objects, operate, ours, waits_elsewhere
-from tests.support.scenes import shrink_shadows
 from tests.support.walk import any_values, walk_lengths
-from tests.support.walk.walk_operations import Artist, walk
+from tests.support.walk.walk_operations import Artist, main
 from tests.support.walk.walk_steps import needs_room, pick, step
 
 seeds = st.integers(0, 2**31)
@@ -268,11 +262,4 @@ def things_alive():
 
 
 if __name__ == "__main__":
-    faulthandler.enable()
-    sys.stderr = invariants.Echo(sys.stderr)
-    hair_addon.register()
-    gpu.init()
-    shrink_shadows(pytest.MonkeyPatch())
-    walk(*map(int, sys.argv[1:]), Everyone)
-    hair_addon.unregister()
-    print("walked")
+    main(Everyone)

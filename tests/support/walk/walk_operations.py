@@ -391,12 +391,17 @@ def walk(run_count, operation_count, number, artist=Artist):
     seed(number)(get_state_machine_test(artist, settings=limits))()
 
 
-if __name__ == "__main__":
+def main(artist=Artist):
+    """Run walks in a process of their own, with the numbers of the command line."""
     faulthandler.enable()
     sys.stderr = invariants.Echo(sys.stderr)
     hair_addon.register()
     gpu.init()
     shrink_shadows(pytest.MonkeyPatch())
-    walk(*map(int, sys.argv[1:]))
+    walk(*map(int, sys.argv[1:]), artist)
     hair_addon.unregister()
     print("walked")
+
+
+if __name__ == "__main__":
+    main()
