@@ -25,6 +25,7 @@ void main()
   root_frame(normal, tangent, bitangent);
 
   ivec2 guide[SLOTS];
+  ivec2 at_normals[SLOTS];
   float share[SLOTS];
   float log_length[SLOTS];
   vec2 turn[SLOTS];
@@ -34,13 +35,16 @@ void main()
   float total = 0.0;
   vec3 mean_normal = vec3(0.0);
   float mean_way = 0.0;
+  float tied = 0.0;
   for (int slot = 0; slot < SLOTS; slot++) {
     vec4 pair = texelFetch(bindings, bound + ivec2(2 + slot / 2, 0), 0);
     vec2 weighed = (slot % 2 == 0) ? pair.xy : pair.zw;
     int index = int(weighed.x);
     guide[slot] = strand_texel(index, 0, making.point_count + 2, making.row_segments);
     int row = index / making.row_normals;
-    vec3 guide_normal = texelFetch(guide_normals, ivec2(index - row * making.row_normals, row), 0).xyz;
+    at_normals[slot] = ivec2(index - row * making.row_normals, row);
+    vec4 normal_and_tie = texelFetch(guide_normals, at_normals[slot], 0);
+    vec3 guide_normal = normal_and_tie.xyz;
     turn[slot] = frame_turn(guide_normal, tangent, bitangent, normal);
     vec4 shape = texelFetch(segments, guide[slot] + ivec2(making.point_count - 1, 0), 0);
     vec3 lower = turned_by(turn[slot], shape.xyz);
@@ -60,6 +64,7 @@ void main()
     mean_normal += share[slot] * guide_normal;
     vec3 guide_root = texelFetch(segments, guide[slot] + ivec2(making.point_count + 1, 0), 0).xyz;
     mean_way += share[slot] * length(guide_root - root);
+    tied += share[slot] * normal_and_tie.w;
   }
   // No strand is longer than its guides' mean, except by rounding.
   float range = 0.0;
@@ -74,6 +79,7 @@ void main()
     bitangent = carried_along(bitangent, normal, limited);
     normal = limited;
   }
+  range += (tied > 0.0) ? mean_way / total : 0.0;  // means of guides' points begin at the mean of their roots
   range *= 1.001 * making.axes_scale;
 
   // From the surface's frame to the coordinates of drawn strands.
@@ -83,6 +89,10 @@ void main()
   vec3 place = (making.axes * vec4(root, 0.0)).xyz;
   begin_strand(made, place, range, making.point_count, making.row_strands);
   vec3 offset = vec3(0.0);
+  vec3 middle = -root;  // from the root to the mean of the guides' points
+  for (int slot = 0; slot < SLOTS && tied > 0.0; slot++) {
+    middle += share[slot] * texelFetch(segments, guide[slot] + ivec2(making.point_count + 1, 0), 0).xyz;
+  }
   for (int point = 1; point < making.point_count; point++) {
     float x = 0.0;
     float y = 0.0;
@@ -94,7 +104,21 @@ void main()
     }
     float stretch = stretch_of(x, y, z, mean_length, making.keep_length);
     offset += stretch * (tangent * x + bitangent * y + normal * z);
-    put_point(point, offset);
+    float part = 0.0;
+    vec3 beside = vec3(0.0);
+    if (tied > 0.0) {
+      for (int slot = 0; slot < SLOTS; slot++) {
+        vec4 its = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
+        vec4 normal_and_tie = texelFetch(guide_normals, at_normals[slot], 0);
+        vec3 guide_tangent;
+        vec3 guide_bitangent;
+        root_frame(normal_and_tie.xyz, guide_tangent, guide_bitangent);
+        middle += share[slot] * (guide_tangent * its.x + guide_bitangent * its.y + normal_and_tie.xyz * its.z);
+        part += share[slot] * tied_part(float(point), normal_and_tie.w);
+      }
+      beside = (making.axes * vec4(middle, 0.0)).xyz - offset;
+    }
+    put_point(point, offset + part * beside);
   }
   end_strand(made);
 }

@@ -302,6 +302,7 @@ class _PlacementInputs(TypedDict):
     drawn_on: np.ndarray | None
     shape: TriMesh | None
     is_mirrored: bool
+    ties: np.ndarray | None
     device: str
 
 
@@ -319,6 +320,7 @@ def _placement_inputs(surface, shown, mask, parting, device) -> _PlacementInputs
         drawn_on=surface.drawn_on,
         shape=surface.shape,
         is_mirrored=surface.has_flipped_winding,
+        ties=parting.ties,
         device=device,
     )
 

@@ -346,6 +346,7 @@ def bind_hair(
     shape: TriMesh | None = None,
     roots: SurfacePoints | None = None,
     is_mirrored: bool = False,
+    ties: np.ndarray | None = None,
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> HairBinding:
@@ -356,8 +357,8 @@ def bind_hair(
     part lines near the surface, across which strands do not blend guides (consecutive segments that touch form a line),
     or None; drawn_on: (V, 3) vertices of the posed surface on which the part lines were drawn, None for the mesh's own;
     shape: as in `distribute_guides`; roots: existing `SurfacePoints` of strands, None to place them; is_mirrored:
-    whether the mesh's triangles are wound opposite to the triangles of the stored roots, which identify strands. Raises
-    `HairError`.
+    whether the mesh's triangles are wound opposite to the triangles of the stored roots, which identify strands; ties:
+    (G,) in [0, 1], the fraction of each guide's points up to its tie, None without gathered guides. Raises `HairError`.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
@@ -375,9 +376,10 @@ def bind_hair(
             roots = placement.textured_roots.sample_textured(*where, texture)
 
     progress("Finding guides", 0.4)
-    return interpolation.root_binder.RootBinder(mesh, guides.roots, settings, regions, laid, is_mirrored, device).bind(
-        roots
+    binder = interpolation.root_binder.RootBinder(
+        mesh, guides.roots, settings, regions, laid, is_mirrored, device, ties
     )
+    return binder.bind(roots)
 
 
 def laid_lines(

@@ -9,7 +9,9 @@
 //   int strand, int out_row                 index of the strand, and of the row of its weights and results
 //   vec3 root                               its root [m]
 //   vec3 tangent, bitangent, normal         its frame
-//   array_t<float> guide_rows               (G, 8) normal and position of each guide's root, its length, and a zero
+//   array_t<vec3> guide_points              (G, P) [m]
+//   array_t<float> guide_rows               (G, 8) normal and position of each guide's root, its length, and 1 / its
+//                                           number of points up to its tie, 0 for guides that are not gathered
 //   array_t<float> offsets                  (G, groups, 4 * SEGMENTS) segments of guides in the frames of their roots
 //                                           [m], 0 past the tip. In each group: on a CPU all x, all y, all z, then all
 //                                           lengths; on a GPU x, y, z and length of each segment
@@ -30,13 +32,15 @@
 #include "lanes.h"
 #include "vectors.h"
 #include "guide_rows.h"
+#include "guide_points.h"
 #include "guide_sum.strand"
 const int point_count = out_points.shape[1];
 const int slot_count = indices.shape[1];
 const int group_count = offsets.shape[1];
 
-// A guide of the strand: its offsets, its weight, and the cosine and sine of its rotation times the weight.
+// A guide of the strand: its index, its offsets, its weight, and the cosine and sine of its rotation times the weight.
 struct Guide {
+  int index;
   const float* offsets;
   float share, cosine, sine;
 };
@@ -48,7 +52,8 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
   const size_t place = size_t(strand) * slot_count + slot, share_place = size_t(out_row) * slot_count + slot;
   Guide guide;
   guide.share = weights.data[share_place];
-  guide.offsets = offsets.data + size_t(indices.data[place]) * group_count * (4 * SEGMENTS);
+  guide.index = indices.data[place];
+  guide.offsets = offsets.data + size_t(guide.index) * group_count * (4 * SEGMENTS);
   guide.cosine = guide.share * turns.data[place][0];
   guide.sine = guide.share * turns.data[place][1];
   return guide;
@@ -138,7 +143,7 @@ const auto guide_of = [&](int slot) ALWAYS_INLINE {
 #endif
 
 // The frame, which turns at most by the spread against the guides.
-lanes mean_x = 0.0f, mean_y = 0.0f, mean_z = 0.0f, mean_length = 0.0f, mean_way = 0.0f;
+lanes mean_x = 0.0f, mean_y = 0.0f, mean_z = 0.0f, mean_length = 0.0f, mean_way = 0.0f, tied = 0.0f;
 for (int first = 0; first < slot_count; first += LANES) {
   const int count = slot_count - first < LANES ? slot_count - first : LANES;
   ints its_guides = -1;
@@ -154,7 +159,9 @@ for (int first = 0; first < slot_count; first += LANES) {
   mean_z += weighed(its[2]);
   mean_length += weighed(its[6]);
   mean_way += weighed(sqrt_of(dot(way, way)));
+  tied += weighed(its[7]);
 }
+const bool is_tied = get_lane(sum_of(tied), 0) > 0.0f;
 const vector own = {normal[0], normal[1], normal[2]};
 const vector limited = limited_normal(
     own, {sum_of(mean_x), sum_of(mean_y), sum_of(mean_z)}, spread * sum_of(mean_way) / sum_of(mean_length));
@@ -191,6 +198,28 @@ for (int group = 0; group < group_count; ++group) {
   add_up(along_x, last_x);
   add_up(along_y, last_y);
   add_up(along_z, last_z);
+  if (is_tied) {
+#if defined(__CUDA_ARCH__)
+    const int first = 1 + SEGMENTS * group + lane;
+    const lanes point = to_lanes(first);
+#else
+    const int first = 1 + SEGMENTS * group;
+    const lanes point = to_lanes(first + ints{0, 1, 2, 3, 4, 5, 6, 7});
+#endif
+    lanes part = 0.0f, middle_x = 0.0f, middle_y = 0.0f, middle_z = 0.0f;
+    for_guides([&](const Guide& guide) {
+      const float* its = reinterpret_cast<const float*>(guide_points.data) + size_t(guide.index) * point_count * 3;
+      lanes its_x, its_y, its_z;
+      read_points(its, first, point_count, its_x, its_y, its_z);
+      part += guide.share * tied_part(point, guide_rows.data[size_t(guide.index) * 8 + 7]);
+      middle_x += guide.share * its_x;
+      middle_y += guide.share * its_y;
+      middle_z += guide.share * its_z;
+    });
+    along_x += part * (middle_x - along_x);
+    along_y += part * (middle_y - along_y);
+    along_z += part * (middle_z - along_z);
+  }
   write_points(along_x, along_y, along_z, row + 3 + group * (3 * SEGMENTS), point_count - 1 - group * SEGMENTS);
 }
 }

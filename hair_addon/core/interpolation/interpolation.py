@@ -22,6 +22,14 @@ n, moved toward the mean normal of its guides until the chord between them is SP
 with guides' roots g_j and lengths L_j. Hair that is short beside the distance of its guides turns with the surface, and
 so does hair around edges and on thin sheets, where the normals are more than 60° apart (guide_sum.strand).
 
+Strands of gathered guides move from p'_i, which keeps the offset of their root from its guides, to the mean of their
+guides' points, and reach it at the tie:
+
+    p''_i = (1 - s_i) p'_i + s_i sum_j w_j g_j,i,    s_i = sum_j w_j smoothstep(i / (t_j (P - 1)))
+
+with t_j the fraction of a guide's points up to its tie. Behind the tie a strand is within the hull of its guides, so
+within their lock. A mean is shorter than its guides where these diverge; in a lock they do not.
+
 interpolation.cpp computes eight segments of a strand at once, in vector registers of a processor (Clang's vectors,
 which Warp compiles for the processor that it runs on: AVX, NEON) or in neighboring threads of a GPU. Sums over all
 guides stay in registers, segments are added up to points, and a strand is written once. The equations are in
@@ -54,18 +62,22 @@ def interpolate(
     out: wp.array2d[wp.vec3] | None = None,
     under_way: Callable[[], None] | None = None,
     chosen: ChosenStrands | None = None,
+    guide_ties: wp.array[float] | None = None,
 ) -> wp.array2d[wp.vec3]:
     """Return (S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,), for guides (G, P) [m], normals (G,).
 
     keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
     fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`; chosen: strands to compute, in
-    whose order the results and the weights are, which `limited` returns for the same strands. Raises `HairError` if
-    counts do not match.
+    whose order the results and the weights are, which `limited` returns for the same strands; guide_ties: (G,) in
+    [0, 1], the fraction of each guide's points up to its tie, 0 for guides that are not gathered, None for none. Raises
+    `HairError` if counts do not match.
     """
     row_count = len(roots) if chosen is None else len(chosen.strands)
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_points))
     require_count("guides", len(guide_points), guide_weights.guide_count)
+    ties = wp.zeros(len(guide_points), dtype=float, device=roots.device) if guide_ties is None else guide_ties
+    require_count("ties of guides", len(ties), len(guide_points))
     require_count("guide weights", len(guide_weights.weights), row_count)
     for array in (guide_weights.indices, guide_weights.turns):
         require_count("guide weights", len(array), len(roots))
@@ -81,7 +93,7 @@ def interpolate(
     on_cpu = wp.get_device(roots.device).is_cpu
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     guide_rows = wp.empty((guide_count, 8), dtype=float, device=roots.device)
-    launch_guides(_put_offsets, [guide_points, guide_normals], [offsets, guide_rows], chosen)
+    launch_guides(_put_offsets, [guide_points, guide_normals, ties], [offsets, guide_rows], chosen)
     threads = 1 if on_cpu else SEGMENTS
     points = parallel.empty_vectors((row_count, point_count), roots.device) if out is None else out
     strands, of_strand = strand_rows(chosen, roots.device)
@@ -92,6 +104,7 @@ def interpolate(
             strands,
             of_strand(roots),
             of_strand(normals),
+            guide_points,
             offsets,
             guide_rows,
             of_strand(guide_weights.indices),
@@ -117,6 +130,7 @@ def _sum_guides(
     tangent: wp.vec3,
     bitangent: wp.vec3,
     normal: wp.vec3,
+    guide_points: wp.array2d[wp.vec3],
     offsets: wp.array3d[float],
     guide_rows: wp.array2d[float],
     indices: wp.array2d[int],
@@ -133,6 +147,7 @@ def _put_strands(
     chosen: wp.array[int],
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
+    guide_points: wp.array2d[wp.vec3],
     offsets: wp.array3d[float],
     guide_rows: wp.array2d[float],
     indices: wp.array2d[int],
@@ -155,6 +170,7 @@ def _put_strands(
         tangent,
         bitangent,
         normal,
+        guide_points,
         offsets,
         guide_rows,
         indices,
@@ -182,6 +198,7 @@ def _put_offsets(
     chosen: wp.array[int],
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
+    guide_ties: wp.array[float],
     # outputs
     out_offsets: wp.array3d[float],
     out_rows: wp.array2d[float],
@@ -193,4 +210,5 @@ def _put_offsets(
         out_rows[guide, axis] = guide_normals[guide][axis]
         out_rows[guide, 3 + axis] = guide_points[guide, 0][axis]
     out_rows[guide, 6] = length
-    out_rows[guide, 7] = 0.0
+    points_up_to_tie = guide_ties[guide] * float(guide_points.shape[1] - 1)
+    out_rows[guide, 7] = wp.where(points_up_to_tie > 0.0, 1.0 / points_up_to_tie, 0.0)

@@ -26,7 +26,7 @@ class RootBinder:
 
     mesh: `TriMesh` [m]; settings: `HairSettings`; regions: strands blend only guides of one region; lines: `PartLines`
     that strands do not blend guides across, or None; is_mirrored: whether the winding of triangles is opposite to that
-    of the stored roots.
+    of the stored roots; ties: (G,) as in `interpolation.interpolate`.
     """
 
     mesh: TriMesh
@@ -36,6 +36,7 @@ class RootBinder:
     lines: "PartLines | None" = None
     is_mirrored: bool = False
     device: str = "cpu"
+    ties: np.ndarray | None = None
 
     def bind(self, roots: SurfacePoints) -> HairBinding:
         """Return the `HairBinding` of strands at roots."""
@@ -51,7 +52,7 @@ class RootBinder:
             lines=self.lines,
         )
         at_roots, at_guides = (root_positions, root_normals), (positions(self.mesh, self.guide_roots), guide_normals)
-        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
+        return self._weighed(roots, at_roots, at_guides, candidates)
 
     def bind_guides(self, chosen: np.ndarray) -> HairBinding:
         """Return the `HairBinding` of strands at the roots of guides (K,) int32; each follows its own guide alone.
@@ -66,7 +67,7 @@ class RootBinder:
         candidates = interpolation.guide_weights.only_candidates(
             chosen, len(self.guide_roots), self.settings.neighbour_limit, self.device
         )
-        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
+        return self._weighed(roots, at_roots, at_guides, candidates)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
         """Return (S, 2) int32: the two centers nearest to each strand, -1 if there are fewer than two.
@@ -92,6 +93,12 @@ class RootBinder:
     def with_settings(self, settings: Any) -> "RootBinder":
         """Return a copy with other `HairSettings`."""
         return replace(self, settings=settings)
+
+    def _weighed(self, roots, at_roots, at_guides, candidates):
+        import warp as wp
+
+        ties = None if self.ties is None else wp.array(np.float32(self.ties), dtype=float, device=self.device)
+        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored, ties)
 
     @cached_property
     def _guide_frames(self):

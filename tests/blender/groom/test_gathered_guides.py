@@ -69,6 +69,21 @@ def test_guides_are_gathered_outside_of_the_surface(guides, shape):
     assert np.abs(hair[:, -1, 0]).mean() < 0.3  # it follows
 
 
+@pytest.mark.parametrize("shape", ["BRAID", "BUN"])
+def test_strands_lie_among_their_guides_behind_the_tie(guides, shape):
+    """The offset of a strand's root from its guides ends at the tie; guides at new places know where theirs is."""
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)  # all reach the tie
+    gather(guides, shape=shape)
+    for _count in range(2):
+        by_guides, by_strands = points(guides), points(bpy.data.objects["Hair"])
+        behind = by_guides.shape[1] // 2
+        least, most = by_guides[:, behind:].min(axis=0) - 1e-4, by_guides[:, behind:].max(axis=0) + 1e-4
+        assert ((by_strands[:, behind:] >= least) & (by_strands[:, behind:] <= most)).all()
+        api.change_guides(guides, "COUNT", guide_count=2 * len(by_guides))
+        bpy.context.view_layer.update()
+
+
 def test_a_line_through_the_surface_keeps_guides_outside(guides):
     add_line(lines=((LINE[0], (0.0, 0.7, 0.95), (0.0, -0.5, -0.5)),))
     before = points(guides)

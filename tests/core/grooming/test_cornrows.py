@@ -44,7 +44,7 @@ def guides():
 @pytest.fixture(scope="module")
 def braided(ball, guides):
     """Return (points, groups) of the guides gathered along the rows."""
-    after, groups, _held = gathered(ball, guides, ROWS, SETTINGS)
+    after, groups, _held, _ties = gathered(ball, guides, ROWS, SETTINGS)
     after.setflags(write=False)
     return after, groups
 
@@ -93,7 +93,7 @@ def test_means_of_guides_stay_in_their_lock(braided):
 def test_guides_of_few_points_lie_along_their_row_outside_the_surface(ball, guides, count):
     """Segments are nowhere deeper than a quarter of the radius; those of two points cannot bend."""
     some = guides[::2, np.linspace(0, 24, count).astype(int)]
-    after, groups, held = gathered(ball, some, ROWS, SETTINGS)
+    after, groups, held, _ties = gathered(ball, some, ROWS, SETTINGS)
     assert (groups > 0).all() and np.isfinite(after).all() and held.min() >= 0.0
     np.testing.assert_array_equal(after[:, 0], some[:, 0])
     assert from_rows(after[:, -1]).min(axis=1).max() < 3.5 * SETTINGS.tie_radius
@@ -114,7 +114,7 @@ def test_groups_are_locks_of_rows(guides, braided):
 
 def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
-    after, _groups, _held = gathered(ball, longer, ROWS, SETTINGS)
+    after, _groups, _held, _ties = gathered(ball, longer, ROWS, SETTINGS)
     end = ROWS[1][-1]
     ahead = (ROWS[1][-1] - ROWS[1][-2]) / np.linalg.norm(ROWS[1][-1] - ROWS[1][-2])
     beyond = after[guides[:, 0, 0] > 0.0, -1] - end
@@ -126,7 +126,7 @@ def test_guides_beyond_the_end_of_a_row_go_straight_on(ball, guides):
 def test_tails_of_rows_narrow_to_a_second_tie_and_end_in_a_tuft(ball, guides):
     """Guides of a row come close to each other at the second tie near the end, and closer still at the tip."""
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
-    after, groups, _held = gathered(ball, longer, ROWS, SETTINGS)
+    after, groups, _held, _ties = gathered(ball, longer, ROWS, SETTINGS)
     own = after[groups <= 3].astype(np.float64)
     widths = np.linalg.norm(own - own.mean(axis=0), axis=2).max(axis=0)
     assert widths[-2] < 0.5 * SETTINGS.tie_radius and widths[-1] < 0.2 * SETTINGS.tie_radius
@@ -138,15 +138,15 @@ def test_guides_that_are_too_short_for_a_row_do_not_shorten_its_tail(ball, guide
     longer = guides[:, :1] + 4.0 * (guides - guides[:, :1])
     aside = guides[from_rows(guides[:, 0]).min(axis=1) > 2.0 * SETTINGS.tie_radius]
     stubs = aside[:, :1] + 0.01 * (aside - aside[:, :1])
-    alone, _groups, _held = gathered(ball, longer, ROWS, SETTINGS)
-    after, _groups, held = gathered(ball, np.concatenate([longer, *[stubs] * 4]), ROWS, SETTINGS)
+    alone, _groups, _held, _ties = gathered(ball, longer, ROWS, SETTINGS)
+    after, _groups, held, _ties = gathered(ball, np.concatenate([longer, *[stubs] * 4]), ROWS, SETTINGS)
     assert np.linalg.norm(after[:60, -1] - alone[:, -1], axis=1).max() < SETTINGS.tie_radius
     assert (held[60:] == 1.0).all() and (held[:60] < 1.0).all()
 
 
 def test_a_row_that_moves_by_a_millimeter_moves_no_point_by_more_than_ten(ball, guides, braided):
     after, _groups = braided
-    moved, _groups, _held = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
+    moved, _groups, _held, _ties = gathered(ball, guides, [row + np.array([0.001, 0.0, 0.0]) for row in ROWS], SETTINGS)
     apart = np.linalg.norm(moved - after, axis=2).max(axis=1)
     assert np.median(apart) < 0.004 and apart.max() < 0.010
 
@@ -156,7 +156,7 @@ def test_the_shape_does_not_depend_on_the_scale(guides, braided, scale):
     sizes = {name: getattr(SETTINGS, name) * scale for name in ("clearance", "tie_radius", "pitch", "tail_radius")}
     expected, _groups = braided
     rows = [row * scale for row in ROWS]
-    found, _groups, _held = gathered(
+    found, _groups, _held, _ties = gathered(
         subdivided_sphere(4, RADIUS * scale), guides * scale, rows, replace(SETTINGS, **sizes)
     )
     assert np.quantile(np.linalg.norm(found / scale - expected, axis=2), 0.9) < 0.002

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Gathered guides: attributes for the groups of guides, one for each tie or lock, and for the part up to the tie.
+"""Gathered guides: attributes for the groups of guides, one for each tie or lock, and for the parts up to the tie.
 
 The length of this part is also stored, in local units, because guides may be cut or lengthened behind their ties.
 """
@@ -13,27 +13,37 @@ from . import attributes, curves
 
 NAME = "gathered"
 HELD = "gathered_held"
+TIE = "gathered_tie"
 _LENGTH = "gathered_length"  # up to the tie, in local units
-_TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (_LENGTH, "FLOAT"))
+_TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 
 
 @dataclass(frozen=True)
 class Gathered:
     """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the part of the present length up to
-    the tie.
+    the tie, or to the end of a row or bun; ties: (G,) float32, the part of the points up to the tie.
     """
 
     groups: np.ndarray
     held: np.ndarray
+    ties: np.ndarray
 
     def __getitem__(self, chosen):
-        return Gathered(self.groups[chosen], self.held[chosen])
+        return Gathered(self.groups[chosen], self.held[chosen], self.ties[chosen])
 
 
 def groups_of(datablock):
     """Return the groups (G,) int32 of guides; None if no guide is gathered."""
     groups = attributes.read(datablock, NAME, "INT", "CURVE")
     return None if groups is None or not groups.any() else groups
+
+
+def ties_of(datablock):
+    """Return the ties (G,) float32 of guides as in `Gathered`; None if no guide is gathered."""
+    groups, ties = groups_of(datablock), attributes.read(datablock, TIE, "FLOAT", "CURVE")
+    if groups is None or ties is None:  # files from before ties were stored keep their strands
+        return None
+    return np.where(groups != 0, np.clip(np.nan_to_num(ties), 0.0, 1.0), 0.0).astype(np.float32)
 
 
 def read(datablock):
@@ -46,7 +56,9 @@ def read(datablock):
     length = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
     if length is not None:
         held = np.where(held < 1.0, np.clip(np.nan_to_num(length) / _lengths(datablock), 0.0, 1.0), held)
-    return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32))
+    ties = ties_of(datablock)
+    ties = np.zeros(len(groups), np.float32) if ties is None else ties
+    return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32), ties)
 
 
 def write(datablock, gathered):
@@ -62,6 +74,7 @@ def write(datablock, gathered):
     if is_any:
         attributes.write(datablock, NAME, "INT", "CURVE", gathered.groups.astype(np.int32))
         attributes.write(datablock, HELD, "FLOAT", "CURVE", gathered.held.astype(np.float32))
+        attributes.write(datablock, TIE, "FLOAT", "CURVE", gathered.ties.astype(np.float32))
         attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", gathered.held * _lengths(datablock))
 
 
@@ -103,8 +116,10 @@ def add(datablock, gathered):
     """Store new groups of guides, which are apart from equal numbers before; guides with 0 keep their own."""
     present = read(datablock)
     if present is None:
-        present = Gathered(np.zeros(len(gathered.groups), np.int32), np.zeros(len(gathered.groups), np.float32))
+        none = np.zeros(len(gathered.groups), np.float32)
+        present = Gathered(none.astype(np.int32), none, none)
     is_new = gathered.groups > 0
     others = np.where(is_new, 0, present.groups)
     groups = np.where(is_new, gathered.groups + others.max(initial=0), others)
-    write(datablock, Gathered(groups, np.where(is_new, gathered.held, present.held)))
+    held, ties = np.where(is_new, gathered.held, present.held), np.where(is_new, gathered.ties, present.ties)
+    write(datablock, Gathered(groups, held, ties))

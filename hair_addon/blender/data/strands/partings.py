@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Partings: vertex groups, integer attributes and curves → regions and line segments."""
+"""Partings: vertex groups, integer attributes and curves → regions and line segments; ties of gathered guides."""
 
 import hashlib
 from dataclasses import dataclass
@@ -20,22 +20,24 @@ _WHOLE = {"INT", "INT8", "BOOLEAN"}
 class Partings:
     """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] in a `Surface`'s coordinates, or None.
 
-    lines_key: `drawn_lines.key` of the lines.
+    lines_key: `drawn_lines.key` of the lines; ties: (G,) float32 as in `gathered_groups.Gathered`, or None.
     """
 
     regions: tuple
     lines: np.ndarray | None
     lines_key: str
+    ties: np.ndarray | None
 
     @property
     def key(self):
-        """A digest of regions and lines; empty for none."""
-        if not self.regions and self.lines is None:
+        """A digest of regions, lines and ties; empty for none."""
+        if not self.regions and self.lines is None and self.ties is None:
             return ""
         digest = hashlib.blake2b(digest_size=16)
         for array in (part for r in self.regions for part in (r.corners, r.guides)):
             digest.update(b"-" if array is None else array.tobytes())
         digest.update(self.lines_key.encode() or b"-")
+        digest.update(b"" if self.ties is None else self.ties.tobytes())
         return digest.hexdigest()
 
 
@@ -54,7 +56,8 @@ def read(surface_object, surface, guide_curves, settings, depsgraph):
         numbers = _read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph)
         regions += [] if numbers is None else [numbers]
     lines = drawn_lines.read(surface_object, surface, settings.part_lines, depsgraph)
-    return Partings(tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph))
+    ties = None if guide_curves is None else gathered_groups.ties_of(guide_curves)
+    return Partings(tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph), ties)
 
 
 def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):

@@ -56,7 +56,7 @@ def _maker():
     up = np.tile(np.float32([0.0, 0.0, 1.0]), (_STRANDS, 1))
     weights = np.full(slots.shape, 1.0 / _SLOTS, np.float32)
     bound = strand_maker.BoundStrands(
-        np.zeros_like(up), up, up[:_GUIDES], slots, weights, (-3.0, 1.0, 200.0, 0.01), 1.0
+        np.zeros_like(up), up, up[:_GUIDES], up[:_GUIDES, 0], slots, weights, (-3.0, 1.0, 200.0, 0.01), 1.0
     )
     return strand_maker.new_maker(bound, _POINTS, np.eye(3))
 

@@ -24,7 +24,7 @@ class StrandMaker:
     """`BoundStrands` on the GPU, without the points of guides; made by `new_maker`."""
 
     bindings: gpu.types.GPUTexture  # for each strand its root, its normal, and its guides with weights
-    guide_normals: gpu.types.GPUTexture
+    guide_normals: gpu.types.GPUTexture  # and 1 / the number of points up to a guide's tie, or 0
     segments: gpu.types.GPUTexture  # of guides, in the frames of their roots; then limits of weights, and roots
     changes: StrandChanges | None  # None if strands are made for styles
     record: np.ndarray  # uniforms.MAKING
@@ -116,6 +116,7 @@ class BoundStrands:
     roots: np.ndarray  # (S, 3) float32 [m]
     normals: np.ndarray  # (S, 3) float32, unit
     guide_normals: np.ndarray  # (G, 3) float32, unit
+    guide_ties: np.ndarray  # (G,) float32 as in `interpolation.interpolate`
     indices: np.ndarray  # (S, k) int32, -1 for none
     weights: np.ndarray  # (S, k) float32, before guides that differ too much are left out
     fading: tuple[float, float, float, float]  # `Limits.fading`
@@ -126,7 +127,12 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     """Return the `BoundStrands` of a `HairBinding`."""
     weights = binding.guide_weights
     arrays = (binding.positions, binding.normals, binding.guide_normals, weights.indices, weights.weights)
-    return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
+    roots, normals, guide_normals, indices, shares = (array.numpy() for array in arrays)
+    none = np.zeros(len(guide_normals), np.float32)
+    ties = none if binding.guide_ties is None else binding.guide_ties.numpy()
+    return BoundStrands(
+        roots, normals, guide_normals, ties, indices, shares, binding.limits.fading, binding.keep_length
+    )
 
 
 def programs_of(slot_count: int, is_plain: bool) -> list[tuple]:
@@ -153,7 +159,11 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
     slot_count = bound.indices.shape[1]
     _segments_program(), _strands_program(slot_count, is_plain)
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
-    normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
+    require_count("ties of guides", len(bound.guide_ties), guide_count)
+    per_point = np.zeros(guide_count, np.float32)
+    np.divide(1.0, bound.guide_ties * max(point_count - 1, 1), out=per_point, where=bound.guide_ties > 0.0)
+    rows = np.concatenate([bound.guide_normals, per_point[:, None]], axis=1)
+    normals_texture, record["row_normals"] = rows_texture(rows, 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 2)
     changes = None if is_plain else new_changes(strand_count, point_count)
     block = uniforms.uniform_buffer(record)

@@ -27,10 +27,11 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     lines = [] if segments is None else continued(_lines(segments), 2.0 * settings.tie_radius)
     mesh, after = guides.surface.posed_mesh, guides.points.copy()
     barrier = outside_guides.prepared(guides, 0.0, ())
-    groups, held = np.zeros(len(guides.counts), np.int32), np.zeros(len(guides.counts), np.float32)
+    groups = np.zeros(len(guides.counts), np.int32)
+    held, joins = np.zeros(len(groups), np.float32), np.zeros(len(groups), np.float32)
     for chosen, places in guide_tools.to_shape(guides):
-        posed, found, parts = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
-        groups[chosen], held[chosen] = found, parts
+        posed, found, parts, up_to = ties.gathering.gathered(mesh, guides.posed_of(chosen, places), lines, settings)
+        groups[chosen], held[chosen], joins[chosen] = found, parts, up_to
         laid = outside_guides.pushed_posed(barrier, posed)
         at_rest = guides.carried_back(laid, chosen)
         weights = guides.weights[chosen]
@@ -42,7 +43,7 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
         raise HairError("No guides were gathered, because the ties are on another part of the surface: move the curve.")
     changed = guide_tools.write_shapes(guides, after)
     groups = np.where(guides.weights >= _MEMBER, groups, 0)
-    gathered_groups.add(datablock, gathered_groups.Gathered(groups, held))
+    gathered_groups.add(datablock, gathered_groups.Gathered(groups, held, joins))
     _part_hair(datablock)
     return changed
 

@@ -94,9 +94,10 @@ def _part_images(datablock, gathered, sources):
     is_apart = (groups[sources] > 0) & (np.abs(shares[groups[sources]] - 0.5) > _ASIDE)
     images = np.zeros(len(datablock.curves), np.int32)
     images[len(images) - len(sources) :][is_apart] = groups[sources][is_apart]
-    held = np.zeros(len(images), np.float32)
+    held, ties = np.zeros(len(images), np.float32), np.zeros(len(images), np.float32)
     held[len(images) - len(sources) :] = gathered.held[sources]
-    gathered_groups.add(datablock, gathered_groups.Gathered(images, held))
+    ties[len(images) - len(sources) :] = gathered.ties[sources]
+    gathered_groups.add(datablock, gathered_groups.Gathered(images, held, ties))
 
 
 def write(

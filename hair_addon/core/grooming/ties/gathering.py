@@ -36,11 +36,13 @@ _BULGE = 0.25  # height of loose hair relative to its way
 
 def gathered(
     mesh: TriMesh, points: np.ndarray, lines: Sequence[np.ndarray], settings: GatherSettings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (points (S, P, 3) float32 [m] of gathered guides, groups (S,) int32, held (S,) float32).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return (points (S, P, 3) float32 [m] of gathered guides, groups (S,) int32, held (S,), ties (S,) float32).
 
     Groups number the guides that go through one tie, or form one lock of a rope, braid or cornrow, from 1; guides that
     are not gathered have 0. held: the fraction of a guide's length up to its tie, or to the end of its row or bun.
+    ties: the fraction of a guide's points up to the place where it joins its tail, braid, bun or row, which is 1 for
+    guides that end before, and 0 for guides that are not gathered.
 
     mesh: a checked `TriMesh`, the visible surface; points (S, P, 3) [m]; lines: (K, 3) [m] each, from the tie on.
     Guides on parts of the surface without a tie do not change. Raises `HairError` for lines without length.
@@ -57,15 +59,15 @@ def gathered(
     nearest = distances.argmin(axis=0)
     is_gathered = np.isfinite(distances.min(axis=0))
     groups = np.zeros(len(points), np.int32)
-    held = np.zeros(len(points), np.float32)
+    held, ties = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)
     lock_count = tie_tails.LOCKS.get(settings.shape, 1)
     for place, (line, field) in enumerate(zip(lines, fields, strict=True)):
         rows = np.flatnonzero(is_gathered & (nearest == place))
         if len(rows) and points.shape[1] > 1:
-            after[rows], locks, ends = _at_line(mesh, query, points[rows], line, field, settings)
+            after[rows], locks, ends, ties[rows] = _at_line(mesh, query, points[rows], line, field, settings)
             groups[rows] = 1 + place * lock_count + locks
             held[rows] = np.clip(ends / np.maximum(_lengths(after[rows]), 1e-30), 0.0, 1.0)
-    return after, groups, held
+    return after, groups, held, ties
 
 
 def _checked(line):
@@ -89,7 +91,9 @@ def _field(mesh, query, line, settings):
 
 
 def _at_line(mesh, query, points, line, field, settings):
-    """Return the guides (S, P, 3) that one line gathers, their locks (S,), and the lengths (S,) up to the tie [m]."""
+    """Return the guides (S, P, 3) that one line gathers, their locks (S,), the lengths (S,) up to the tie [m], and
+    ties (S,).
+    """
     reach = float(split(points)[1].sum(axis=1).max())
     ways, apart, normals = _traced(mesh, query, points[:, 0], field, settings)
     order = np.argsort(np.argsort(apart[:, 0], kind="stable"))
@@ -103,7 +107,14 @@ def _at_line(mesh, query, points, line, field, settings):
     if settings.shape in tie_tails.LOCKS:
         return _in_braid(points, (ways, ranks), line, normal, settings)
     behind = _in_tail(ways, ranks, tie_tails.tail_line(line, normal, reach, settings), normal, settings)
-    return _along(points, np.concatenate([ways, behind], axis=1)), np.zeros(len(ways), int), _lengths(ways)
+    after, ends = _along(points, np.concatenate([ways, behind], axis=1)), _lengths(ways)
+    return after, np.zeros(len(ways), int), ends, _part_of_points(after, ends)
+
+
+def _part_of_points(points, lengths):
+    """Return (S,): the fraction of the segments of guides (S, P, 3) up to lengths (S,) [m], at most 1."""
+    along = np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2).cumsum(axis=1)
+    return np.minimum(1 + (along < lengths[:, None]).sum(axis=1), along.shape[1]) / along.shape[1]
 
 
 def _along(points, ways):
@@ -125,7 +136,8 @@ def _in_bun(mesh, query, points, ways_and_ranks, line, settings):
     is_long = split(points)[1].sum(axis=1) > _lengths(ways)
     evenly = _evenly(ways[is_long], on_way + 1)
     after[is_long] = np.concatenate([evenly, wound[is_long, 1:]], axis=1)
-    return after, np.zeros(len(ways), int), np.full(len(ways), np.inf)
+    on_way = np.where(is_long, on_way / (points.shape[1] - 1), 1.0)
+    return after, np.zeros(len(ways), int), np.full(len(ways), np.inf), on_way
 
 
 def _in_braid(points, ways_and_ranks, line, normal, settings):
@@ -135,7 +147,7 @@ def _in_braid(points, ways_and_ranks, line, normal, settings):
     is_long = whole > lengths
     reach = max(float(np.median((whole - lengths)[is_long])) if is_long.any() else 0.0, 1e-6)
     tail = tie_tails.tail_line(line, normal, reach, settings)
-    angles = _angles(ways, tail, normal)
+    angles = tie_tails.evened(_angles(ways, tail, normal))
     locks = tie_tails.locks_at(angles, settings)
     on_way, behind = tie_tails.segment_counts(points.shape[1] - 1)
     along = np.linspace(0.0, reach, max(behind, 1) + 1)
@@ -147,7 +159,8 @@ def _in_braid(points, ways_and_ranks, line, normal, settings):
     after[is_long] = np.concatenate(
         [_evenly(ways[is_long], on_way + 1, _NEAR_ROOT), braid[is_long, 1 : behind + 1]], axis=1
     )
-    return after, locks, np.where(is_long, lengths, np.inf)
+    on_way = np.where(is_long, on_way / (points.shape[1] - 1), 1.0)
+    return after, locks, np.where(is_long, lengths, np.inf), on_way
 
 
 def _in_row(mesh, query, points, ways_and_ranks, surface_below, settings):
@@ -163,16 +176,17 @@ def _in_row(mesh, query, points, ways_and_ranks, surface_below, settings):
     places, locks = cornrows.joined_at(row, ways, settings)
     braided = cornrows.points_of(row, places, ranks, locks, settings)
     first = np.minimum(np.searchsorted(row.places, places), len(row.places) - 1)
-    after = _along(points, ways)
+    after, joins = _along(points, ways), np.ones(len(ways))
     for guide in np.flatnonzero(is_long):
         left = braided[guide, first[guide] :]
         before = points.shape[1] - len(left)
+        joins[guide] = before / count
         way = np.concatenate([points[guide, :1], ways[guide, 1:], left[:1]])
         after[guide] = np.concatenate([_evenly(way[None], before + 1)[0], left[1:]])
     after[is_long] = raised_segments.raised(mesh, query, after[is_long], _DEEP * settings.tie_radius)
     row_end = np.count_nonzero(row.places <= row.on_surface) - len(row.places)  # from the end
     ends = np.where(is_long, _lengths(after[:, : after.shape[1] + row_end]), np.inf)
-    return after, locks, ends
+    return after, locks, ends, joins
 
 
 def _evenly(ways, count, power=1.0):

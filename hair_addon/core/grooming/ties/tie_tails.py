@@ -78,6 +78,16 @@ def framed(points: np.ndarray, normal: np.ndarray, reach: float) -> TailLine:
     return TailLine(along, centers, unit(np.cross(tangents, ups)), ups, max(reach, 1e-9))
 
 
+def evened(angles: np.ndarray) -> np.ndarray:
+    """Return angles (S,) moved to even distances on the circle, in the same order and on average by nothing.
+
+    Most hair arrives at a tie from one side; so locks that divide the circle would differ tenfold in their hair.
+    """
+    order = np.argsort(np.argsort(angles, kind="stable"))
+    even = 2.0 * np.pi * (order + 0.5) / len(angles)
+    return even - np.angle(np.exp(1j * (even - angles)).sum())
+
+
 def locks_at(angles: np.ndarray, settings: GatherSettings) -> np.ndarray:
     """Return (S,) int: the lock of a rope or braid that hair at angles (S,) in the disk of the tie joins; else 0."""
     count = LOCKS.get(settings.shape, 1)

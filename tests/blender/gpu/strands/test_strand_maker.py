@@ -33,8 +33,11 @@ def vectors(array):
     return wp.array(np.float32(array), dtype=wp.vec3, device="cpu")
 
 
-def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0, keep_length=1.0):
-    """Return (`HairBinding`, guides as `Strands`): curled guides of many lengths, one of them zero, over a ball."""
+def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0, keep_length=1.0, is_gathered=False):
+    """Return (`HairBinding`, guides as `Strands`): curled guides of many lengths, one of them zero, over a ball.
+
+    is_gathered: whether some of the guides have ties.
+    """
     guide_roots, roots = unit(rng.normal(size=(GUIDES, 3))), unit(rng.normal(size=(STRANDS, 3)))
     roots[:5] = guide_roots[:5]  # at guides, and straight below
     roots[5] = (0.0, 0.0, -1.0)
@@ -56,6 +59,9 @@ def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0,
     guide_places = SurfacePoints(np.zeros(GUIDES, np.int32), np.zeros((GUIDES, 3), np.float32))
     frames = (np.float32(guide_roots), guide_normals)
     binding = hair_binding.weighed(places, (vectors(roots), normals), frames, candidates, settings)
+    if is_gathered:
+        ties = np.where(rng.random(GUIDES) < 0.5, rng.uniform(0.1, 1.0, GUIDES), 0.0)
+        binding = replace(binding, guide_ties=wp.array(np.float32(ties), dtype=float, device="cpu"))
     return binding, strands.from_numpy(np.float32(points), guide_places, "cpu")
 
 
@@ -81,10 +87,10 @@ AXES = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
 @pytest.mark.parametrize(
     ("point_count", "slots", "limits"),
     [
-        (9, 8, {}),
+        (9, 8, {"is_gathered": True}),
         (41, 3, {"keep_length": 0.3, "angle_limit": np.pi, "length_limit": 1e6}),
         (3, 1, {"angle_limit": 0.2}),
-        (17, 5, {"length_limit": 1.0, "keep_length": 0.0}),
+        (17, 5, {"length_limit": 1.0, "keep_length": 0.0, "is_gathered": True}),
     ],
 )
 def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):

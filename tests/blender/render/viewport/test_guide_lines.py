@@ -151,7 +151,7 @@ def test_guides_of_a_tie_share_a_color(guides):
     np.testing.assert_array_equal(read(guides), plain)
     count = len(guides.data.curves)
     groups = np.arange(count) % 3
-    gathered_groups.write(guides.data, gathered_groups.Gathered(groups, np.zeros(count, np.float32)))
+    gathered_groups.write(guides.data, gathered_groups.Gathered(groups, *np.zeros((2, count), np.float32)))
     assert len(hues(plain)) < len(hues(read(guides))) and abs(read(guides) - plain).max() > 0.05
 
 
