@@ -16,7 +16,7 @@ from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
-from . import layer_items, map_items, setting_properties, shared_wetness, style_items, style_keys
+from . import layer_items, map_items, object_names, setting_properties, shared_wetness, style_items, style_keys
 from .marks import (
     mark_colliding,
     mark_dynamics,
@@ -435,14 +435,9 @@ def mesh_name(name, description):
         description=description,
         options={"SKIP_SAVE"},
         translation_context=CONTEXT,
-        search=_mesh_names,
+        search=object_names.meshes,
         search_options=set(),
     )
-
-
-def _mesh_names(_owner, context, typed):
-    names = (o.name for o in context.view_layer.objects if o is not None and o.type == "MESH")
-    return [name for name in names if typed.casefold() in name.casefold()]
 
 
 def switch(name, description, default):

@@ -12,7 +12,7 @@ from ...core.errors import HairError
 from ...core.params import declared, from_surface, label_of
 from ...core.placement import densities
 from ..host.notices import text_of
-from . import fitted_sizes, length_steps
+from . import fitted_sizes, length_steps, object_names
 from .translations import CONTEXT
 
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
@@ -36,7 +36,7 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, ove
             update = fitted_sizes.by_hand(name, mark) if mark is not None and name in sizes else mark
             details = replace(details, high=highs.get(name, details.high))
             is_unkeyed = details.is_structural or name in unkeyed
-            search = (searches or {}).get(name)
+            search = (searches or object_names.SEARCHES).get(name)
             made[name] = _property(name, default, details, update, is_unkeyed, set(override), search)
             if mark is not None and _is_length(default, details):
                 made[length_steps.coarse_name(name)] = _coarse_property(name, details)

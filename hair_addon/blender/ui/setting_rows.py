@@ -151,7 +151,7 @@ def guide_rows(layout, owner, surface, are_combed=False):
 def growth_rows(layout, owner):
     """Length variation and direction of guides."""
     rows(layout, owner, GuideSettings, _GROWTH)
-    search_row(layout, owner, "flow_lines", bpy.data, "objects")
+    row(layout, owner, "flow_lines")
     angle = layout.column()
     angle.active = owner.drape or bool(text_of(owner, "flow_lines"))
     rows(angle, owner, GuideSettings, ("lift",))
@@ -180,7 +180,7 @@ def parting_rows(layout, owner, surface):
         # Suggestions: attributes of modifiers and of guides are not listed.
         attributes = {"source": surface.data, "collection": "attributes", "results_are_suggestions": True}
         search_row(layout, owner, "region_attribute", **attributes)
-    search_row(layout, owner, "part_lines", bpy.data, "objects")
+    row(layout, owner, "part_lines")
 
 
 def blending_rows(layout, owner, skip=()):

@@ -56,7 +56,7 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
             surface = self._surface(context)
         except HairError:
             surface = None
-        setting_rows.search_row(self.layout, self.properties, "surface", bpy.data, "objects")
+        setting_rows.row(self.layout, self.properties, "surface")
         for name in ("every", "applies_modifiers", "grows_hair"):
             setting_rows.row(self.layout, self.properties, name)
         if self.grows_hair:
@@ -130,7 +130,7 @@ class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and (is_foreign(context.object) or cls.may_be_redone(context))
 
     def draw(self, context):
-        setting_rows.search_row(self.layout, self.properties, "surface", bpy.data, "objects")
+        setting_rows.row(self.layout, self.properties, "surface")
         for name in ("guide_count", "applies_modifiers", "follows_guides"):
             setting_rows.row(self.layout, self.properties, name)
 
@@ -355,7 +355,7 @@ class VELLUS_OT_mesh_to_hair(LongOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and (is_mesh or cls.may_be_redone(context))
 
     def draw(self, context):
-        setting_rows.search_row(self.layout, self.properties, "surface", bpy.data, "objects")
+        setting_rows.row(self.layout, self.properties, "surface")
         for name in ("strand_count", "root_end", "reaches_surface", "uses_alpha", "fills", "seed"):
             setting_rows.row(self.layout, self.properties, name)
         for name in ("guide_count", "hides_mesh"):
@@ -406,7 +406,7 @@ class VELLUS_OT_transfer_groom(LongOperator, bpy.types.Operator):
         return context.mode == "OBJECT" and guides_of(context.object) is not None
 
     def draw(self, context):
-        setting_rows.search_row(self.layout, self.properties, "target", bpy.data, "objects")
+        setting_rows.row(self.layout, self.properties, "target")
         setting_rows.row(self.layout, self.properties, "method")
         if self.method == "NEAREST":
             setting_rows.row(self.layout, self.properties, "alignment")

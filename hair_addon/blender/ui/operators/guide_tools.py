@@ -279,8 +279,7 @@ class VELLUS_OT_gather_guides(GuideTool, bpy.types.Operator):
         return "{count} guides gathered", {"count": count}
 
     def draw_settings(self, layout):
-        setting_rows.search_row(layout, self.properties, "line", bpy.data, "objects")
-        for name in ("shape", *_ROWS_OF_SHAPES[self.shape], "tightness", "clearance"):
+        for name in ("line", "shape", *_ROWS_OF_SHAPES[self.shape], "tightness", "clearance"):
             setting_rows.row(layout, self.properties, name)
 
 
