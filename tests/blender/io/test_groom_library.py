@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from hair_addon import api
 from hair_addon.blender.data.made import groom_assets
-from hair_addon.blender.data.strands import attributes
+from hair_addon.blender.data.strands import gathered_groups, selection_sets
 from hair_addon.blender.io import asset_catalogs, groom_library
 from hair_addon.core.errors import HairError
 from tests.support.dynamics.following import update
@@ -78,15 +78,21 @@ def test_a_turned_and_scaled_copy_gets_it_exactly(groom, library, sphere, is_app
     np.testing.assert_allclose(weights, vertex_positions(sphere)[:, 2] > 0.0, atol=1e-4)
 
 
-def test_regions_of_guides_come_along(groom, sphere, tmp_path):
+def test_regions_ties_and_selections_of_guides_come_along(groom, sphere, tmp_path):
     guides, hair = groom
     parts = (api.points(guides)[:, 0, 0] > 0.0).astype(np.int32)
-    attributes.write(guides, "part", "INT", "CURVE", parts)
-    hair.vellus.hair.region_attribute = "part"
+    fractions = np.linspace(0.1, 0.9, len(parts), dtype=np.float32)
+    gathered = gathered_groups.Gathered(1 + parts, fractions, fractions[::-1])
+    gathered_groups.write(guides, gathered)
+    selection_sets.write(guides, "Left", np.repeat(parts > 0, len(guides.points) // len(parts)))
+    hair.vellus.hair.region_attribute = gathered_groups.NAME
     update()
     file = api.save_groom(hair, tmp_path, name="Parted", catalog="", picture=PICTURE)
     its_guides, its_hair = api.apply_groom(sphere, file)
-    np.testing.assert_array_equal(attributes.read(its_guides, "part", "INT", "CURVE"), parts)
+    its = gathered_groups.read(its_guides)
+    for found, wanted in zip((its.groups, its.held, its.ties), (1 + parts, fractions, fractions[::-1]), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-5)
+    np.testing.assert_array_equal(selection_sets.read_guides(its_guides, "Left"), parts > 0)
     assert api.settings_of(its_hair) == api.settings_of(hair) and its_hair.vellus.status == ""
     update()
     np.testing.assert_allclose(api.points(its_hair), api.points(hair), atol=1e-4)

@@ -20,9 +20,9 @@ from ....core.files.settings_file import GroomSettings
 from ....core.geometry.mesh import SurfacePoints, TriMesh, check_mesh
 from ....core.long_work import Work
 from ...data import scene, surface_collections, usable_surfaces, whole_changes
-from ...data.strands import attributes, curves
+from ...data.strands import attributes, curves, gathered_groups, selection_sets
 from ...host.notices import name_of
-from ...settings import setting_properties
+from ...settings import selection_names, setting_properties
 from .. import pipeline
 from ..foreign.hand_made_guides import HandMade
 from . import carried_masks, groom_settings
@@ -39,8 +39,8 @@ class LibraryGroom:
     """A saved groom: guides on their surface, masks and settings.
 
     source: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, concatenated; counts: (G,)
-    of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides; left: names
-    of objects and images in settings that are not part of the groom.
+    of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides, also saved
+    selections of whole guides; left: names of objects and images in settings that are not part of the groom.
     """
 
     name: str
@@ -93,10 +93,13 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     for mask in library_settings.masks_of(settings):
         if mask in surface_object.vertex_groups:
             masks[mask] = scene.read_vertex_group(surface_object, depsgraph, mask)
-    for region in (settings.hair.region_attribute, *library_settings.masks_of(settings)):
+    of_ties = (gathered_groups.HELD, gathered_groups.TIE) if gathered_groups.groups_of(guides) is not None else ()
+    for region in (settings.hair.region_attribute, *of_ties, *library_settings.masks_of(settings)):
         values = _of_guides(guides, region)
         if values is not None:
             regions[region] = values
+    for selection in selection_names.names_of(guides):
+        regions[selection_names.PREFIX + selection] = selection_sets.read_guides(guides, selection).astype(np.int32)
     lost = {mask: "" for mask in library_settings.masks_of(settings) if mask not in masks and mask not in regions}
     settings = library_settings.renamed(settings, lost)
     if settings.hair.region_attribute and settings.hair.region_attribute not in regions:
@@ -212,13 +215,25 @@ def _drawn(groom, surface_object, kept, points):
     return drawn
 
 
+def _keep_selections(guides):
+    """Save the selections of a groom, which are numbers of whole guides; returns whether there are any."""
+    names = [name for name in guides.attributes.keys() if name.startswith(selection_names.PREFIX)]
+    for name in names:
+        values = attributes.read(guides, name, "INT", "CURVE")
+        if values is not None:
+            are_chosen = np.repeat(values != 0, curves.point_counts(guides))
+            selection_sets.write(guides, name.removeprefix(selection_names.PREFIX), are_chosen)
+    return bool(names)
+
+
 def _keep_settings(made, settings):
     """Store the settings of the groom's guides and hair unchanged."""
     setting_properties.assign(made.guides.vellus.guides, settings.guides)
     if settings.hair.density_group == settings.guides.density_group:
         made.hair.vellus.hair.density_group = ""  # strands use the mask of the guides, which exist now
-    if settings.hair.region_attribute:
-        made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
+    has_selections = _keep_selections(made.guides)
+    made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
+    if settings.hair.region_attribute or has_selections:
         pipeline.evaluate(made.hair, scene.present_depsgraph())
     for target in (made.guides, made.hair):
         target.vellus.is_stale = False
