@@ -99,7 +99,9 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
         if values is not None:
             regions[region] = values
     for selection in selection_names.names_of(guides):
-        regions[selection_names.PREFIX + selection] = selection_sets.read_guides(guides, selection).astype(np.int32)
+        are_chosen = selection_sets.read_guides(guides, selection)
+        if are_chosen is not None:
+            regions[selection_names.PREFIX + selection] = are_chosen.astype(np.int32)
     lost = {mask: "" for mask in library_settings.masks_of(settings) if mask not in masks and mask not in regions}
     settings = library_settings.renamed(settings, lost)
     if settings.hair.region_attribute and settings.hair.region_attribute not in regions:
