@@ -345,6 +345,11 @@ class _Function:
             self.refuse(statement.test, "a random number in a condition")
         return [f"{indent}while ({condition}) {{", *self.block(statement.body, depth + 1), indent + "}"]
 
+    def _break(self, statement, depth):
+        if self.turns:
+            self.refuse(statement, "a break in an unrolled loop")
+        return ["  " * depth + "break;"]
+
     def _has_constants(self, node):
         """Return whether a loop reads constant vectors; such a loop is unrolled, as by Warp."""
         subscripts = [part for part in ast.walk(node) if isinstance(part, ast.Subscript)]
@@ -514,10 +519,11 @@ class _Function:
     def _call_of_warp(self, name, node):
         if name == "tid":
             return _Value("thread_index()", "int")
-        if name == "mesh_query_ray":
+        if name in ("mesh_query_ray", "mesh_query_ray_anyhit"):
             self.program.has_mesh = True
             ray = [self.value(argument).text for argument in node.args[1:]]
-            return _Value(f"mesh_query_ray({', '.join(ray)})", _RAY)
+            nearest = f"mesh_query_ray({', '.join(ray)})"
+            return _Value(nearest, _RAY) if name == "mesh_query_ray" else _Value(f"{nearest}.result", "bool")
         arguments = [self.value(argument) for argument in node.args]
         texts = [argument.text for argument in arguments if isinstance(argument, _Value)]
         if name == "randf":

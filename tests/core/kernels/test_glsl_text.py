@@ -43,6 +43,18 @@ def _with_a_sum(out_number: wp.array[float]):
     out_number[wp.tid()] += 1.0
 
 
+_TWO = wp.constant(wp.vec2(1.0, 2.0))
+
+
+@wp.func
+def _with_a_break(a: float):
+    for turn in range(2):
+        if a < _TWO[turn]:
+            break
+        a -= 1.0
+    return a
+
+
 @wp.func
 def _with_two_types(a: float):
     b = a
@@ -57,6 +69,7 @@ def _with_two_types(a: float):
         (lambda: glsl_text.kernel_text(_with_a_matrix), r"wp\.identity"),
         (lambda: glsl_text.kernel_text(_with_a_random_condition), "random number in a condition"),
         (lambda: glsl_text.kernel_text(_with_a_sum), "read and written"),
+        (lambda: glsl_text.function_text(_with_a_break), "break in an unrolled loop"),
         (lambda: glsl_text.function_text(_with_two_types), "float before, int here"),
     ],
 )
