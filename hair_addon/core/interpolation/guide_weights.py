@@ -15,16 +15,15 @@ shapes and not on roots, so it needs no search, and combing repeats it.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import warp as wp
 
 from ..geometry.search import hash_grid
-from ..kernels import kernel_cache, parallel
+from ..kernels import chosen_rows, kernel_cache, parallel
 from ..kernels.checks import require_count, require_indices
+from ..kernels.chosen_rows import chosen_at
 from ..kernels.parallel import Rows
 from . import cpu_weights, part_lines, sharp_edges
 
@@ -144,33 +143,6 @@ def chosen_strands(guide_weights: GuideWeights, chosen: np.ndarray) -> ChosenStr
     is_followed[its_guides] = True  # index -1 stands for no guide
     guides = np.flatnonzero(is_followed[:-1]).astype(np.int32)
     return ChosenStrands(strands, wp.array(guides, dtype=int, device=indices.device))
-
-
-@wp.func
-def chosen_at(chosen: wp.array[int], row: int):
-    """Return the chosen strand or guide of a row; the row itself if none are chosen."""
-    if chosen.shape[0] == 0:
-        return row
-    return chosen[row]
-
-
-def strand_rows(chosen: ChosenStrands | None, device: wp.DeviceLike) -> tuple[Any, Callable[[wp.array], Any]]:
-    """Return the arguments of a launch for the first parameter of a kernel, and for arrays of all strands."""
-    if chosen is None:
-        return wp.empty(0, dtype=int, device=device), Rows
-    return Rows(chosen.strands), lambda array: array
-
-
-def launch_guides(
-    kernel: wp.Kernel, inputs: list[wp.array], outputs: list[wp.array], chosen: ChosenStrands | None
-) -> None:
-    """Run a kernel on all guides, or on those that chosen strands follow; all arrays have a row for each guide."""
-    device = inputs[0].device
-    if chosen is None:
-        none = wp.empty(0, dtype=int, device=device)
-        parallel.launch(kernel, len(inputs[0]), [none, *map(Rows, inputs)], outputs, device)
-    else:
-        parallel.launch(kernel, len(chosen.guides), [Rows(chosen.guides), *inputs, *outputs], [], device)
 
 
 def find_candidates(
@@ -312,10 +284,10 @@ def limited(
     require_count("guide normals", len(guide_normals), len(guide_points))
     device = guide_points.device
     shapes = wp.empty((len(guide_points), cpu_weights.NUMBERS), dtype=float, device=device)
-    launch_guides(_shapes, [guide_points, guide_normals], [shapes], chosen)
+    chosen_rows.launch(_shapes, [guide_points, guide_normals], [shapes], None if chosen is None else chosen.guides)
     row_count = len(guide_weights.weights) if chosen is None else len(chosen.strands)
     weights = wp.empty((row_count, guide_weights.weights.shape[1]), dtype=float, device=device)
-    strands, of_strand = strand_rows(chosen, device)
+    strands, of_strand = chosen_rows.arguments(None if chosen is None else chosen.strands, device)
     arrays = (guide_weights.indices, guide_weights.weights, guide_weights.turns)
     inputs = [strands, *map(of_strand, arrays), shapes, *limits.fading]
     parallel.launch(_limit, row_count, inputs, [weights], device)

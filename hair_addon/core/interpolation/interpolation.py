@@ -41,10 +41,11 @@ from collections.abc import Callable
 import warp as wp
 
 from ..geometry.search.hash_grid import LIMIT
-from ..kernels import native_code, parallel
+from ..kernels import chosen_rows, native_code, parallel
 from ..kernels.checks import require_count
+from ..kernels.chosen_rows import chosen_at
 from ..kernels.parallel import Rows
-from .guide_weights import ChosenStrands, GuideWeights, chosen_at, frame, launch_guides, strand_rows
+from .guide_weights import ChosenStrands, GuideWeights, frame
 from .hair_binding import SPREAD
 
 wp.set_module_options({"enable_backward": False})
@@ -93,10 +94,11 @@ def interpolate(
     on_cpu = wp.get_device(roots.device).is_cpu
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     guide_rows = wp.empty((guide_count, 8), dtype=float, device=roots.device)
-    launch_guides(_put_offsets, [guide_points, guide_normals, ties], [offsets, guide_rows], chosen)
+    guides = None if chosen is None else chosen.guides
+    chosen_rows.launch(_put_offsets, [guide_points, guide_normals, ties], [offsets, guide_rows], guides)
     threads = 1 if on_cpu else SEGMENTS
     points = parallel.empty_vectors((row_count, point_count), roots.device) if out is None else out
-    strands, of_strand = strand_rows(chosen, roots.device)
+    strands, of_strand = chosen_rows.arguments(None if chosen is None else chosen.strands, roots.device)
     parallel.launch(
         _put_strands,
         row_count,
