@@ -9,6 +9,7 @@ import warp as wp
 
 from ..geometry.strands import curve_offsets
 from ..kernels import native_code, parallel
+from ..kernels.checks import require_count, require_indices
 from ..kernels.parallel import Rows
 from .guide_layers import GuideLayers
 
@@ -151,12 +152,14 @@ def compose(layers: GuideLayers, guides: np.ndarray | None = None, out: np.ndarr
     """Return the points (N, 3) float32 of guides with their layers.
 
     guides: (M,) indices of the guides to be composed, None for all; out: (N, 3) float32, in which their points are
-    overwritten, None for a new array.
+    overwritten, None for a new array. Raises `HairError` for another number of points, and for missing guides.
     """
     if out is None:
         out = np.empty((len(layers.base), 3), np.float32)
     if guides is None:
         guides = np.arange(len(layers.counts), dtype=np.int32)
+    require_count("composed points", len(out), len(layers.base))
+    require_indices("guides", guides, len(layers.counts))
     if not len(out) or not len(guides):
         return out
     points = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)

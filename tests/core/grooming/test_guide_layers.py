@@ -340,6 +340,11 @@ def test_arrays_that_do_not_fit_are_refused(combed):
         layers.weighted(np.ones((2, 2)))
     with pytest.raises(HairError, match="edited points"):
         guide_layers.recorded(layers, 0, points[:-1])
+    is_chosen = np.arange(len(layers.counts)) == 3
+    with pytest.raises(HairError, match="composed points"):
+        guide_layers.composed_again(layers, points[:-1], is_chosen)
+    with pytest.raises(HairError, match="out of range"):
+        guide_layers.composed_again(layers, points, np.append(is_chosen, True))
 
 
 def _carried(sphere, layers, strands, others, settings=None, regions=()):
