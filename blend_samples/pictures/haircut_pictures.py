@@ -38,7 +38,7 @@ WIDTH, HEIGHT = 250, 290  # pixels of a picture
 COLUMNS = 3
 WINDOW_SIZE = (560, 440)
 SHOWN = 300  # strands in the window, which software drivers draw slowly
-KEPT = {"cat": 90_000}  # strands of a haircut that has more than `STRANDS`
+MORE_STRANDS = {"cat": 90_000}  # of haircuts that need more than `STRANDS`
 CYCLES_SAMPLES = 48
 COMPARISON = (("", "Vellus"), ("_cycles", "Cycles"))  # endings of names, and labels
 
@@ -105,7 +105,8 @@ def cut(name):
     shutil.rmtree(profile, ignore_errors=True)  # it may contain an older version of the extension
     profile.mkdir(parents=True)
     script = ROOT / "tests" / "desktop" / "haircuts" / "in_window.py"
-    words = [name, extension, OUT, OUT / (BARE_CAT if name == "cat" else BARE), SHOWN, KEPT.get(name, STRANDS)]
+    bare = OUT / (BARE_CAT if name == "cat" else BARE)
+    words = [name, extension, OUT, bare, SHOWN, MORE_STRANDS.get(name, STRANDS)]
     blender = desktop_blender.find_or_install()
     before = _done_count(name)
     status = blender.run(script, words, profile=profile, log=log, limit=900, size=WINDOW_SIZE)

@@ -51,10 +51,11 @@ def block_error(reference, picture):
 
 
 def noiseless_block_error(halves, picture):
-    """Return an estimate of `block_error` against the picture whose noisy halves these are.
+    """Return an estimate of the `block_error` of a picture against a reference without noise.
 
-    Display curves are concave, so noise darkens displayed pixels, and their means. Half the samples have twice this
-    bias, which the difference removes [Quenouille56].
+    halves: two noisy pictures of the reference, each with half of its samples. Display curves are concave, so noise
+    darkens displayed pixels and their means. Each half has twice the bias of both together, so their difference
+    removes the bias [Quenouille56].
     """
     reference = 0.5 * (halves[0] + halves[1])
     exposure = _exposure(reference)

@@ -152,10 +152,10 @@ def convert_particles(
     """Convert the hair of a mesh object's particle system, and switch the system off.
 
     use: "HAIR" keeps the hairs as strands and derives guides from them, with `DerivationSettings` and changes by name;
-    "GUIDES" uses the hairs as guides, without `settings`, and grows strands between them. Of several systems, the
-    active one is converted, or the first with hair. Child hairs are not converted. The result has `hair` and `guides`,
-    the Curves. Blender converts selected objects, so afterwards only the mesh and the new object are selected. Raises
-    `HairError`.
+    "GUIDES" uses the hairs as guides and grows strands between them, without settings or changes. Of several systems,
+    the active one is converted, or the first with hair. Child hairs are not converted. The result has `hair` and
+    `guides`, the Curves. Blender converts selected objects, so afterwards only the mesh and the new object are
+    selected. Raises `HairError`.
 
     >>> scalp = bpy.data.objects["Scalp"]
     >>> system = scalp.modifiers.new("Hair", "PARTICLE_SYSTEM").particle_system

@@ -67,7 +67,7 @@ def run(given, console):
 
 
 def _require_usable(given):
-    """Raise `HairError` for contradicting options, files that cannot be read, and files that cannot be written."""
+    """Raise `HairError` for contradictory options, and for files that cannot be read or written."""
     came_from = curve_options.checked(given)
     if given.from_library and (came_from or given.from_mesh or given.from_particles or given.settings):
         raise HairError(

@@ -7,7 +7,7 @@ from blend_samples.sheets import picture_pairs
 
 
 def test_noise_of_references_is_no_error(rng):
-    """The right picture has little error against noisy halves, and a wrong picture has its error."""
+    """Against noisy halves, the right picture has little error, and a darker or brighter picture its true error."""
     light = np.ones((48, 48, 4), np.float32)
     light[..., :3] = rng.uniform(0.5, 1.5, (48, 48, 1))
     halves = []

@@ -89,7 +89,7 @@ def choose():
 
 
 def follow():
-    """Choose all other guides in Sculpt Mode, save them by the same name, and undo this."""
+    """Choose all other guides in Sculpt Mode, save them under the same name, and undo this."""
     for step in (
         press("vellus.comb_guides"),
         press("curves.select_all", action="INVERT"),

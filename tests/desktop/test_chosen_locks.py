@@ -9,7 +9,7 @@ pytestmark = [pytest.mark.desktop, pytest.mark.long]
 
 
 def test_locks_lie_around_clicked_guides(desktop, extension, new_profile):
-    """Locks follow a selection that is saved again in Sculpt Mode, and its undo."""
+    """Locks follow a selection that is saved again in Sculpt Mode, and undo."""
     walk = walks.take(desktop, "chosen_locks", extension, new_profile(), "opengl", size=(560, 440))
     walk.assert_done()
     assert walk.complaints() == []

@@ -166,7 +166,7 @@ def faces_of(mesh):
 
 @contextmanager
 def faces_read_once():
-    """A context in which a single evaluation of a dependency graph is read: `cached_faces` reads each mesh once."""
+    """Context for reading a single evaluation of a dependency graph: `cached_faces` reads each mesh only once."""
     global _faces_read
     before, _faces_read = _faces_read, {}
     try:
@@ -178,8 +178,8 @@ def faces_read_once():
 def cached_faces(mesh_object, mesh, is_own=True):
     """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
-    is_own: whether it is the only mesh of the object, not one that Geometry Nodes instance. Reading the starts of
-    polygons is the slowest part. With the same vertices and edges at corners and the same number of polygons, the
+    is_own: whether the mesh is the object's own, not an instance of Geometry Nodes. Reading the starts of polygons is
+    the slowest part. With the same vertices and edges at corners and the same number of polygons, the
     polygons are the same: the last edge of each leads back to its first vertex.
     """
     if _faces_read is None or not is_own:

@@ -171,7 +171,7 @@ def _parts(strand_count):
 def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None):
     """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `scene_programs.strip_program`.
 
-    record: of `strand_record`; lights: a uniform buffer of `uniforms.LIGHTS`; samplers: {sampler: texture} of the
+    record: from `strand_record`; lights: a uniform buffer of `uniforms.LIGHTS`; samplers: {sampler: texture} of the
     program besides those of strands; clip_planes: (6, 4) for a program that is clipped.
     """
     count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))

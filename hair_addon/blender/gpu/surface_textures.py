@@ -147,7 +147,7 @@ def upload_surface(
     packed = tuple(packed_colors([color for _count, color in colors]).tolist()) if colors else (0.0,)
     counts = [count for count, _color in colors] if colors else [len(triangles)]
     if normals is None and known is not None:
-        has_vertex_normals = known.corners.has_vertex_normals  # the same corners for viewports that read normals
+        has_vertex_normals = known.corners.has_vertex_normals  # viewports that read normals use the same corners
     corners = _Corners(triangles, has_vertex_normals, uvs, tuple(zip(counts, packed, strict=True)), len(vertices))
     if known is not None and known.corners.is_same(corners):
         corners = known.corners

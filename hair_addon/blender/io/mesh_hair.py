@@ -116,7 +116,7 @@ def _new_curves(name, found, settings, surface_object):
 
 
 def _show_colors(hair, colors):
-    """Give hair the mean of the colors (S, 3) of its strands, and a map of them."""
+    """Give hair the mean of its strands' colors (S, 3), and a map of these colors."""
     color = tuple(np.clip(colors.mean(axis=0), 0.0, 1.0).tolist())
     own = properties.own_look_of(hair.vellus)
     looks.apply_look(hair, replace(own, parametrization="COLOR", color=color))

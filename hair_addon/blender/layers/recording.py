@@ -107,8 +107,8 @@ def _shape(guides, layers):
 
 
 def _recorded(layers, state, points, shape, is_other):
-    """Return (`GuideLayers` with edited points in the active layer, (G,) bool: guides that they reproduce, refusal or
-    an empty text).
+    """Return (`GuideLayers` with edited points in the active layer, (G,) bool: guides that the layers reproduce,
+    refusal or an empty text).
 
     is_other: (G,), guides whose points differ from the shape (N, 3).
     """
@@ -164,7 +164,7 @@ def read(guides: Curves, depsgraph: Depsgraph) -> GuideLayers:
 
 
 def _weights(guides, depsgraph, is_shown=False):
-    """Return the weights (L, G) float32 of layers; is_shown: those of the present points."""
+    """Return the weights (L, G) float32 of layers; is_shown: weights of the present points."""
     state = guides.vellus
     weights = np.zeros((len(state.layers), len(guides.curves)), np.float32)
     for row, item in zip(weights, state.layers, strict=True):

@@ -132,7 +132,7 @@ def _follow_surfaces(deformed, changed, transformed, depsgraph):
 def _follow_places(moved, transformed, scene, depsgraph):
     """Mark hair that depends on the places of other objects, and preserve the density of scaled surfaces.
 
-    moved: datablocks with changes of geometry or transforms; transformed: of transforms.
+    moved: datablocks with changes of geometry or transforms; transformed: datablocks with changes of transforms.
     """
     stale_marks.follow_partings(moved, transformed, depsgraph)
     stale_marks.follow_flow(moved, transformed, depsgraph)
@@ -155,7 +155,7 @@ def _follow_undo(scene, depsgraph):
 
 
 def _follow_painting(reports, edited, depsgraph):
-    """Mark guides and hair with painted images, and with values of edited mesh objects."""
+    """Mark guides and hair that use painted images, or values of edited mesh objects."""
     if any(report.is_of(bpy.types.Image, bpy.types.World) for report in reports):
         events.image_changed()
     painted = {report.datablock for report in reports if report.is_of(bpy.types.Image)} - {None}
@@ -166,7 +166,7 @@ def _follow_painting(reports, edited, depsgraph):
 
 
 def _follow_geometry(changed, depsgraph):
-    """Forget what was read of changed meshes and Curves; returns {guide Curves that have moved: (N, 3) points}."""
+    """Discard cached data of changed meshes and Curves; returns {guide Curves that have moved: (N, 3) points}."""
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Mesh):

@@ -68,7 +68,7 @@ def _carry_guides(guides, depsgraph, is_mesh_edited):
 
 
 def _follow_edited_mesh(surface_object, depsgraph, carried, in_place):
-    """Mark hair whose surface has other weights or partings; carried and in_place: of `follow_surface`."""
+    """Mark hair whose surface has other weights or partings; carried, in_place: as in `follow_surface`."""
     for hair in bpy.data.hair_curves:
         state = hair.vellus
         if curves.grown_on(hair) != surface_object or state.kind != "HAIR":

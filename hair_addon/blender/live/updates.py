@@ -103,7 +103,7 @@ def are_of_hair_in_frame(updates: list[Update]) -> bool:
 
 
 def type_of_object(update: Update) -> str | None:
-    """Blender's type of an object; None for other datablocks and for deleted objects."""
+    """Return Blender's type of an object; None for other datablocks and for deleted objects."""
     return update.datablock.type if update.is_of(bpy.types.Object) and update.datablock is not None else None
 
 

@@ -230,8 +230,8 @@ def read(
 def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_played, has_normals):
     """Return `_SURROUNDINGS` of a scene: its meshes on the GPU.
 
-    is_shaded: whether Vellus shades surfaces; grown_on: of `_surface_uids`; is_played: during playback;
-    has_normals: as for `drawn_meshes.read_drawn_meshes`; others: of `read`.
+    is_shaded: whether Vellus shades surfaces; grown_on: from `_surface_uids`; is_played: during playback; has_normals:
+    as in `drawn_meshes.read_drawn_meshes`; other parameters: as in `read`.
     """
     meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_played, has_normals)
     if is_shaded:
@@ -247,7 +247,7 @@ def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_playe
 def _needing_normals(blender_scene, viewport, shown, grown_on, is_moving):
     """Whether surfaces that Blender draws in a viewport need normals, or {session_uid} of those that do.
 
-    Normals are for shadows of hair on surfaces, and at rest for light paths. Blender computes them for each pose.
+    Shadows of hair on surfaces need normals, and at rest light paths do. Blender computes normals for each pose.
     """
     if viewport.shading.type != "MATERIAL":
         return False if shown.is_wire else grown_on
@@ -256,7 +256,7 @@ def _needing_normals(blender_scene, viewport, shown, grown_on, is_moving):
 
 
 def _lacks_normals(drawn):
-    """Whether surfaces of a `DrawnScene` were read without normals, as they moved."""
+    """Whether surfaces of a `DrawnScene` were read without normals, because they moved."""
     return any(blocker.source is not None and blocker.source.normals is None for blocker in drawn.blockers)
 
 
@@ -487,9 +487,9 @@ def visibility(drawn):
 
 
 def _visibility_since(last, drawn, are_made):
-    """Return (`visibility`, the `Renewal` that updates it or None) of a `DrawnScene` after another; None: of a new one.
+    """Return (`visibility` of a `DrawnScene`, the `Renewal` that updates it or None); last: the former one, or None.
 
-    are_made: whether a GPU makes or carries hair, whose visibility changes by one step; other visibility is kept.
+    are_made: whether a GPU makes or carries hair: then visibility is updated by one step, otherwise it is kept.
     """
     if last is None or not _have_same_places(last, drawn):
         return visibility(drawn), None

@@ -82,7 +82,7 @@ class StrandGenerator:
         return styles.styling is None or style_maker.can_style(styles.styling)
 
     def rest(self) -> None:
-        """Release memory that is needed only while strands change, as they have been written."""
+        """Release the memory that is needed only until changed strands are written."""
         if isinstance(self.maker, style_maker.StyleMaker):
             self.maker.rest()
 

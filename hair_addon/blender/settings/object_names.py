@@ -10,7 +10,7 @@ def meshes(_owner, context, typed):
 
 
 def lines(_owner, context, typed):
-    """Return the names of objects that can be drawn lines: curves without hair, and meshes of edges alone."""
+    """Return the names of objects that can be drawn lines: curves that are not hair, and meshes without faces."""
     return _matching(typed, (o for o in context.view_layer.objects if o is not None and _has_lines(o)))
 
 

@@ -28,8 +28,8 @@ class GuideLayers:
     base (N, 3) float32; counts (G,): points of each guide; normals, tangents (G, 3): perpendicular unit axes of the
     frame at each root; turns (L, N, 4) float32: quaternion w, x, y, z of the segment that ends at a point, zero counts
     as no turn; stretches (L, N) float32: logarithm of its length ratio; weights (L, G) float32: of each layer and
-    guide, at least 0. For `composed` and `recorded`, turns
-    and stretches may also be tuples of L contiguous arrays, such as those in Blender's memory.
+    guide, at least 0. For `composed` and `recorded`, turns and stretches may also be tuples of L contiguous arrays, as
+    in Blender's memory.
     """
 
     base: np.ndarray
@@ -120,12 +120,12 @@ def recorded(
     is_edited: np.ndarray | None = None,
     in_place: bool = False,
 ) -> tuple[GuideLayers, np.ndarray]:
-    """Return (layers whose layer of index `active` reproduces edited guides, (G,) bool: guides that it reproduces).
+    """Return (layers whose layer of index `active` reproduces edited guides, (G,) bool: edited guides it reproduces).
 
     points: (N, 3) of the edited guides; shape: (N, 3) float32, the composed points if they are known; is_edited: (G,),
     `is_other` of points and shape if it is known; in_place: whether the arrays of `layers` may change. Other layers do
     not change. The base of a guide moves with its root. Guides for which the active layer has a weight below
-    `LEAST_WEIGHT` do not change. Of guides that the layer had reproduced before, none count.
+    `LEAST_WEIGHT` do not change.
     """
     points = np.asarray(points, np.float32)
     require_count("edited points", len(points), len(layers.base))

@@ -185,8 +185,9 @@ def record(layers: GuideLayers, active: int, points: np.ndarray, guides: np.ndar
 
 
 def _inputs(layers, guides):
-    """Return the blocks of guides, the arguments of both kernels that describe layers, and the arrays of layers, which
-    must be kept until the kernel has run, as the arguments are their addresses.
+    """Return the blocks of guides, the arguments of both kernels that describe layers, and the arrays of layers.
+
+    The arrays must be kept until the kernel has run, because the arguments contain only their addresses.
     """
     turns, stretches = ([_there(row, float) for row in values] for values in (layers.turns, layers.stretches))
     blocks = np.arange(-(-len(guides) // _WIDTH), dtype=np.int32)

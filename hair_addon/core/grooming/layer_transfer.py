@@ -40,9 +40,9 @@ def transferred(
 
 
 def _shares(layers, others, indices, weights, apart):
-    """Return (indices without -1, squared weights (M, k) with a sum of one, whether guides are the same as the first).
+    """Return (indices without -1, squared weights (M, k) of sum 1, (M,) bool: guides that are the same as their first).
 
-    Arguments: as of `transferred`.
+    Arguments: as in `transferred`.
     """
     weights = np.where(indices >= 0, weights, 0.0).astype(np.float64) ** 2
     sums = weights.sum(axis=1, keepdims=True)
@@ -58,7 +58,7 @@ def _shares(layers, others, indices, weights, apart):
 
 
 def _write_means(found, layers, indices, weights):
-    """Write weighted means of turns and stretches to layers of other guides; indices and weights: of `_shares`."""
+    """Write weighted means of turns and stretches to layers of other guides; indices, weights: from `_shares`."""
     starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(found.counts)
     vectors = _root_vectors(layers)
     axes, other_axes = _axes(layers), _axes(found)
@@ -84,7 +84,7 @@ def _write_means(found, layers, indices, weights):
 
 
 def _write_same(found, layers, guides, sources):
-    """Write turns and stretches of guides (N,) at the places of sources (N,) bit for bit, with the same frames."""
+    """Copy turns, stretches and frames to guides (N,) from sources (N,) at the same places, bit for bit."""
     starts, other_starts = geometry.strands.curve_offsets(layers.counts), geometry.strands.curve_offsets(found.counts)
     for guide, source in zip(guides, sources, strict=True):
         own = slice(other_starts[guide], other_starts[guide + 1])

@@ -134,7 +134,7 @@ class ChosenStrands:
 
 
 def chosen_strands(guide_weights: GuideWeights, chosen: np.ndarray) -> ChosenStrands:
-    """Return the `ChosenStrands` with indices (M,). Raises `HairError` if there is no such strand."""
+    """Return the `ChosenStrands` with indices (M,). Raises `HairError` if an index is out of range."""
     require_indices("strands", chosen, len(guide_weights.indices))
     indices = guide_weights.indices
     strands = wp.array(np.asarray(chosen, np.int32), dtype=int, device=indices.device)

@@ -69,9 +69,9 @@ def interpolate(
 
     keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
     fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`; chosen: strands to compute, in
-    whose order the results and the weights are, which `limited` returns for the same strands; guide_ties: (G,) in
-    [0, 1], the fraction of each guide's points up to its tie, 0 for guides that are not gathered, None for none. Raises
-    `HairError` if counts do not match.
+    the order of the results and of the weights, which `limited` returns for the same strands, None for all; guide_ties:
+    (G,) in [0, 1], the fraction of each guide's points up to its tie, 0 for guides that are not gathered, None if no
+    guide is gathered. Raises `HairError` if counts do not match.
     """
     row_count = len(roots) if chosen is None else len(chosen.strands)
     require_count("normals", len(normals), len(roots))

@@ -153,10 +153,10 @@ def wetness(styles: Sequence[StyleSettings]) -> float:
 
 
 def same_steps(program: Program, data: "StrandData", other: Program, other_data: "StrandData") -> int:
-    """Return the number of first steps that are equal in two programs, with what they read of their strands' data.
+    """Return the number of first steps that are equal in two programs, as are the data of strands that they read.
 
-    Both are for the same strands and clump centers, of which members alone may differ. A step may read points of clump
-    centers: these are as before if the steps before it are.
+    Both programs are for the same strands and clump centers; only the members of centers may differ. A step may read
+    points of clump centers, which are the same if all steps before it are the same.
     """
     count = min(len(program), len(other))
     choices, numbers = program.choices[:count], program.numbers[:count]

@@ -295,15 +295,15 @@ class _StrandReader:
     choosers: list[varied_numbers.VariedTree | None]  # of each level
     bindings: list[HairBinding]  # of the centers of each level
     steps: list[Step]
-    numbers: list[tuple[int, ...]]  # of `varied_numbers.places_of`
+    numbers: list[tuple[int, ...]]  # from `varied_numbers.places_of`
     mask_keys: list[tuple[str, str, bool]]
-    side: int  # of `_side`
+    side: int  # from `_side`
     centre_arrays: "dict[str, wp.array]"
 
     def data_of(self, owner: Owner, bound: HairBinding, known: int, step_count: int) -> StrandData:
         """Return the `StrandData` of strands that may belong to centers of the first `known` levels.
 
-        step_count: of the first steps, which are applied to them.
+        step_count: number of first steps, which are applied to these strands.
         """
         device = self.centre_arrays["centre_normals"].device
         members = self._members_of(owner, bound, known)

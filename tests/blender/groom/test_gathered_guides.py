@@ -71,7 +71,7 @@ def test_guides_are_gathered_outside_of_the_surface(guides, shape):
 
 @pytest.mark.parametrize("shape", ["BRAID", "BUN"])
 def test_strands_lie_among_their_guides_behind_the_tie(guides, shape):
-    """The offset of a strand's root from its guides ends at the tie; guides at new places know where theirs is."""
+    """The offset of a strand's root from its guides ends at the tie, also after guides were added."""
     add_line()
     api.change_guides(guides, "LENGTH", method="SET", length=6.0)  # all reach the tie
     gather(guides, shape=shape)

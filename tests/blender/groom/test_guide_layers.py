@@ -109,7 +109,7 @@ def stored(guides, place):
 
 
 def test_recording_takes_what_layers_store_now_and_undo_steps_keep_theirs(layered):
-    """Recording writes to the memory of Blender's attributes; nothing else may share it, nor be remembered."""
+    """Recording writes to the memory of Blender's attributes, which undo steps do not share, and keeps no copy."""
     comb(layered)
     api.add_layer(layered)
     comb(layered, (1.0, 0.0, 0.0))
@@ -118,7 +118,7 @@ def test_recording_takes_what_layers_store_now_and_undo_steps_keep_theirs(layere
     turns = before[0][0].copy()
     turns[:, 1:] *= -1.0
     name = f"layer_{layered.data.vellus.layers[0].identity}_turn"
-    layered.data.attributes[name].data.foreach_set("value", turns.ravel())  # by a script, which reports nothing
+    layered.data.attributes[name].data.foreach_set("value", turns.ravel())  # by a script, without a report
     combed = points(layered)
     combed[:2] = leaned(combed[:2], (0.0, 0.0, 2.0))
     write_points(layered, combed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fields of lines offer the objects that can be drawn lines, and no others."""
+"""Fields of lines offer only objects that can be drawn lines."""
 
 import bpy
 

@@ -170,7 +170,7 @@ def test_recording_with_the_known_shape_is_the_same(combed):
 
 
 def test_layers_may_be_in_separate_memory(combed):
-    """Composing and recording are the same bit for bit; recording in place changes only the memory of its layer."""
+    """Layers in separate arrays give the same bits; recording in place changes only the memory of its layer."""
     layers, points = combed
     edited = _combed(points, layers.counts, np.array([0.5, 0.0, 1.5]), np.array([0.0, 0.9, 0.3]))
     again, is_made = guide_layers.recorded(layers, 1, edited)
@@ -206,7 +206,7 @@ def test_invalid_numbers_of_layers_count_as_zero(combed):
 
 @pytest.mark.parametrize("weight", [0.005, 0.02, 0.5, 1.0, 2.0])
 def test_recording_knows_which_guides_its_layer_reproduces(combed, weight):
-    """Recorded guides are reproduced if composing finds their points; small weights cannot turn far enough."""
+    """A layer reproduces guides if composing returns their points; small weights cannot turn far enough."""
     layers, _points = combed
     weights = np.array([1.0, weight, 0.7])[:, None] * np.ones_like(layers.weights)
     layers = layers.weighted(weights)

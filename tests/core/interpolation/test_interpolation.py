@@ -240,7 +240,7 @@ def test_opposite_normals_keep_the_length():
 
 @pytest.mark.parametrize("point_count", [1, 2, 9, 41])
 def test_strands_of_gathered_guides_reach_the_mean_of_their_guides_at_the_tie(scene, point_count):
-    """Strands move from their own places to the means of guides' points; no other strand changes a bit."""
+    """Strands move from their own places to the means of guides' points; other strands keep the same bits."""
     guides = np.concatenate([scene["guides"]] * 2, axis=1)[:, :point_count]
     arrays = scene["roots"], scene["normals"], guides, scene["guide_normals"]
     roots, normals, points, guide_normals = (vectors(array) for array in arrays)

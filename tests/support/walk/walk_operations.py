@@ -392,7 +392,7 @@ def walk(run_count, operation_count, number, artist=Artist):
 
 
 def main(artist=Artist):
-    """Run walks in a process of their own, with the numbers of the command line."""
+    """Run walks as a separate process, with the numbers of the command line."""
     faulthandler.enable()
     sys.stderr = invariants.Echo(sys.stderr)
     hair_addon.register()

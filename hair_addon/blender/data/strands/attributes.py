@@ -127,10 +127,10 @@ def read_into(curves, name, data_type, domain, out):
 
 
 def view(curves, name, data_type, domain):
-    """Return float values like `read`, in Blender's memory, which is made unique; None as `read`.
+    """Return float values like `read`, as a view of Blender's memory, which no copy shares any longer; None as `read`.
 
-    The view is valid until the next evaluation, undo step or change of the number of values. Writing to it changes the
-    attribute.
+    The view is valid until the next evaluation, undo step or change of the number of values. Writing to the view
+    changes the attribute.
     """
     if not has(curves, name, data_type, domain):
         return None

@@ -20,8 +20,8 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 
 @dataclass(frozen=True)
 class Gathered:
-    """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the part of the present length up to
-    the tie, or to the end of a row or bun; ties: (G,) float32, the part of the points up to the tie.
+    """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the fraction of the present length up
+    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie.
     """
 
     groups: np.ndarray
@@ -41,7 +41,7 @@ def groups_of(datablock):
 def ties_of(datablock):
     """Return the ties (G,) float32 of guides as in `Gathered`; None if no guide is gathered."""
     groups, ties = groups_of(datablock), attributes.read(datablock, TIE, "FLOAT", "CURVE")
-    if groups is None or ties is None:  # files from before ties were stored keep their strands
+    if groups is None or ties is None:  # strands of files from before ties were stored do not change
         return None
     return np.where(groups != 0, np.clip(np.nan_to_num(ties), 0.0, 1.0), 0.0).astype(np.float32)
 

@@ -36,10 +36,10 @@ def read(datablock, identities, weights):
 
 
 def opened(datablock, identities, weights, active):
-    """Return `GuideLayers` like `read`, whose base, turns and stretches are in Blender's memory, as copies take most of
-    the time of recording. They are valid until the next evaluation.
+    """Return `GuideLayers` like `read`, with base, turns and stretches in Blender's memory.
 
-    active: index of the layer that will be recorded, whose attributes are created if they are missing.
+    Copies would take most of the time of recording. The arrays are valid until the next evaluation. active: index of
+    the layer that will be recorded, whose attributes are created if they are missing.
     """
     point_count, layers = len(datablock.points), []
     for place, identity in enumerate(identities):

@@ -36,8 +36,10 @@ class StrandBounds:
         return self.levels[0][0]
 
     def joined(self) -> Callable[[], np.ndarray]:
-        """Join the boxes of strands; returns a function that reads the result once: (2, 3) float32 least and greatest
-        coordinates. Reading waits until the strands are made.
+        """Join the boxes of strands; returns a function that returns the result.
+
+        The result, (2, 3) float32 least and greatest coordinates, is read by the first call, which waits until the
+        strands are made.
         """
         program = _join_program()
         program.bind()

@@ -39,10 +39,10 @@ class StrandChanges:
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """Return `strands` as the program leaves them, with exact bounds, which wait until the program has run.
+        """Return `strands` as the program leaves them, with exact bounds.
 
-        They are read when they are first needed, so the GPU runs the programs of all hair while the CPU reads the rest
-        of the scene.
+        The first use of the bounds reads them, and waits until the program has run. So the GPU runs the programs of all
+        hair while the CPU reads the rest of the scene.
         """
         before = strands.moved.turn if strands.moved else 0
         if self.row_moved:

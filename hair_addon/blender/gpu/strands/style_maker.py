@@ -5,7 +5,7 @@ The program of a stack is the same rows of numbers that core/styling runs: a sli
 of clumps are made and styled first, level by level, in their own texture. The sources of steps are shared with
 core/styling.
 
-While a slider of a style moves, strands are kept as the styles before it leave them.
+While a style's slider moves, strands are stored as they are before this style.
 """
 
 from dataclasses import dataclass, field, replace
@@ -78,12 +78,12 @@ class StyleMaker:
     levels: list[_Pass]
     hair: _Pass
     changes: StrandChanges
-    plain: list[gpu.types.GPUTexture]  # (`MOST_AT_ONCE`, P) strands before or between styles: one, or one per part
+    plain: list[gpu.types.GPUTexture]  # (`MOST_AT_ONCE`, P) strands before or between styles, for all parts or each
     _guide_points: np.ndarray | None = None  # of the last `make`
-    # The styles of the last `make`, and how many of their steps are the same as before.
+    # The styles of the last `make`, and the number of their first steps that were the same as before.
     _before: "Styling | None" = field(default=None, init=False)
     _same_before: int = field(default=0, init=False)
-    _contained: int | None = field(default=None, init=False)  # steps whose results `plain` contains; None: nothing
+    _contained: int | None = field(default=None, init=False)  # number of steps applied in `plain`; None: unknown
     _lacks_memory: bool = field(default=False, init=False)  # whether the driver refused strands between styles
 
     @property
@@ -124,9 +124,9 @@ class StyleMaker:
         self._same_before, self._lacks_memory = 0, False
 
     def _same_as(self, before):
-        """Return (whether all clump centers are those of other styles, the number of first steps whose results are).
+        """Return (whether other styles have the same clump centers, the number of first steps with the same results).
 
-        (False, None) if even strands without styles differ, or another program would round otherwise.
+        (False, None) if even strands without styles differ, or if another program is used, which may round differently.
         """
         if before is None or _kinds_of(before.program) != _kinds_of(self.styling.program):
             return False, None
@@ -161,7 +161,7 @@ class StyleMaker:
         self._contained = kept if len(self.plain) == len(firsts) else None
 
     def _may_keep(self, strand_count):
-        """Whether each part of the strands has its texture, which is created here unless memory would not suffice."""
+        """Whether each part of the strands has its own texture; creates missing textures if there is enough memory."""
         firsts, point_count = range(0, strand_count, MOST_AT_ONCE), self.styling.point_count
         if len(self.plain) < len(firsts):
             if self._lacks_memory or strand_count * point_count > MOST_KEPT:
@@ -176,7 +176,7 @@ class StyleMaker:
         return True
 
     def _style(self, program, strands, images, first, count, first_step=0, end_step=None):
-        """Apply steps to some strands of a `_Pass`; before the last step they are written to `plain` again."""
+        """Apply steps to some strands of a `_Pass`; if steps are left, strands are written to `plain` again."""
         plain, drawn = images
         end_step = int(strands.record["step_count"]) if end_step is None else end_step
         program.bind()
@@ -375,7 +375,7 @@ def _are_equal(array, other):
 
 
 def _same_steps(now, before, changed):
-    """`same_steps` for pairs (program, data), at most up to the first step of a level that is in `changed`."""
+    """`same_steps` for pairs (program, data), at most up to the first step that reads a level in `changed`."""
     same = same_steps(*now, *before)
     readers = np.flatnonzero(np.isin(now[0].choices[:same, CHOICES.index("level")], changed))
     return int(readers[0]) if len(readers) else same

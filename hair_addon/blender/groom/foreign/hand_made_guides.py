@@ -163,7 +163,7 @@ def open_curves(
 ) -> tuple[Surface, SeenCurves, Affine]:
     """Return a surface, the curves of an object, and the `Affine` from their coordinates to the surface's.
 
-    applies_modifiers: as of `using_as_guides`. Raises `HairError`, also for an object without curves.
+    applies_modifiers: as in `using_as_guides`. Raises `HairError`, also for an object without curves.
     """
     require_usable(curves_object, surface_object)
     curves_objects.store_rest_positions(surface_object)

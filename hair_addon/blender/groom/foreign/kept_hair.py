@@ -104,7 +104,7 @@ def using_as_hair(
 def _reproduced(
     surface: Surface, placed: PlacedCurves, guides: PlacedCurves | None, settings: DerivationSettings, progress
 ) -> tuple[HairSettings, DerivedGuides]:
-    """Return settings of the hair, and the `DerivedGuides` that reproduce it; guides: that came with it, or None."""
+    """Return settings of the hair, and the `DerivedGuides` that reproduce it; guides: given with it, or None."""
     count = len(placed.counts)
     guide_count = min(settings.guide_count, count) if guides is None else len(guides.counts)
     wanted = groom_defaults.complete(HairSettings(strand_count=count), surface.posed_mesh, None, None, guide_count)

@@ -84,7 +84,7 @@ def follow_surface(
 
 
 def _reroot(guide_curves, surface, depsgraph):
-    """Root strands on other faces; strands of deleted faces are reported in the status."""
+    """Root strands on the edited faces; the status reports strands of deleted faces."""
     curves.require_not_linked(guide_curves)
     state = guide_curves.vellus
     was_open = state.is_on_open
@@ -97,7 +97,7 @@ def _reroot(guide_curves, surface, depsgraph):
 
 
 def _follow_moved(guide_curves, surface, before):
-    """Move strands with the vertices of their surface; before: (V, 3) of the vertices."""
+    """Move strands with the vertices of their surface; before: (V, 3), former positions of the vertices."""
     curves.require_not_linked(guide_curves)
     require_finite(surface.rest)
     shift = applied_transforms.shift_of(before, surface)

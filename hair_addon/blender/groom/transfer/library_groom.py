@@ -39,8 +39,8 @@ class LibraryGroom:
     """A saved groom: guides on their surface, masks and settings.
 
     source: the surface; roots: G `SurfacePoints`; points: (N, 3) float32 [m] of the guides, concatenated; counts: (G,)
-    of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides, also saved
-    selections of whole guides; left: names of objects and images in settings that are not part of the groom.
+    of each; masks: {name: (V,) weights}; regions: {name: (G,) int32 or float32}, attributes of the guides, and
+    saved selections of whole guides; left: names of objects and images in settings that are not part of the groom.
     """
 
     name: str
@@ -218,7 +218,7 @@ def _drawn(groom, surface_object, kept, points):
 
 
 def _keep_selections(guides):
-    """Save the selections of a groom, which are numbers of whole guides; returns whether there are any."""
+    """Save the selections of a groom, which has a number for each guide; returns whether there are any."""
     names = [name for name in guides.attributes.keys() if name.startswith(selection_names.PREFIX)]
     for name in names:
         values = attributes.read(guides, name, "INT", "CURVE")

@@ -144,7 +144,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             self._check_files(blender_scene)
 
     def _film_settings(self, depsgraph, size, passes, labels, step_count):
-        """Return the arguments of a `Frame` after its window; samples and paths are shared by the motion steps."""
+        """Return the arguments of a `Frame` after its window; motion steps share samples and paths."""
         blender_scene = depsgraph.scene
         sample_count = depsgraph.view_layer.samples or blender_scene.vellus.sample_count
         filter_width = pixel_sampling.FILTER_WINDOW * blender_scene.render.filter_size

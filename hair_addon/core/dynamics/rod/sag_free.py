@@ -65,7 +65,7 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
 
 
 def least_stiffnesses(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> np.ndarray:
-    """Return factors (S,) float64: the least of a material's bending stiffness with which each strand is stable.
+    """Return (S,) float64: the least factor of a material's bending stiffness with which each strand is stable.
 
     groom: (S, M+1, 3) [m]; gravity [m/s²]. 0 for hanging strands, whose tip is the lowest point.
     """

@@ -229,7 +229,7 @@ def _split_by_group(curves, parameters, kept) -> Iterator[CurveSet]:
 
 
 def _with_attributes(curves, of_curves, group_name):
-    """Return curves with their IDs, root UVs and guides; of_curves(name, kind, width): a parameter or None."""
+    """Return curves with their IDs, root UVs and guides; of_curves(name, kind, width) returns a parameter or None."""
     ids, uvs = of_curves("groom_id", "iu"), of_curves("groom_root_uv", "f", 2)
     guide_ids = of_curves("groom_closest_guides", "iu", GUIDE_SLOTS)
     weights = of_curves("groom_guide_weights", "f", GUIDE_SLOTS)

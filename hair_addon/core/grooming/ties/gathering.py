@@ -41,8 +41,8 @@ def gathered(
 
     Groups number the guides that go through one tie, or form one lock of a rope, braid or cornrow, from 1; guides that
     are not gathered have 0. held: the fraction of a guide's length up to its tie, or to the end of its row or bun.
-    ties: the fraction of a guide's points up to the place where it joins its tail, braid, bun or row, which is 1 for
-    guides that end before, and 0 for guides that are not gathered.
+    ties: the fraction of a guide's points up to the place where it joins its tail, braid, bun or row; 1 for guides that
+    end before this place, 0 for guides that are not gathered.
 
     mesh: a checked `TriMesh`, the visible surface; points (S, P, 3) [m]; lines: (K, 3) [m] each, from the tie on.
     Guides on parts of the surface without a tie do not change. Raises `HairError` for lines without length.

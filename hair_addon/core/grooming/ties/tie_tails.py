@@ -79,9 +79,10 @@ def framed(points: np.ndarray, normal: np.ndarray, reach: float) -> TailLine:
 
 
 def evened(angles: np.ndarray) -> np.ndarray:
-    """Return angles (S,) moved to even distances on the circle, in the same order and on average by nothing.
+    """Return angles (S,) spread evenly on the circle, in the same order and with the same mean direction.
 
-    Most hair arrives at a tie from one side; so locks that divide the circle would differ tenfold in their hair.
+    Most hair arrives at a tie from one side, so without this, locks that divide the circle would have tenfold
+    different amounts of hair.
     """
     order = np.argsort(np.argsort(angles, kind="stable"))
     even = 2.0 * np.pi * (order + 0.5) / len(angles)

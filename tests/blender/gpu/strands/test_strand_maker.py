@@ -173,7 +173,7 @@ def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
 
 
 def test_bounds_are_read_once_they_are_needed(blender, rng, monkeypatch):
-    """Making strands waits for no program of the GPU: the first use of their bounds does, once."""
+    """Making strands does not wait for the GPU; only the first use of their bounds does."""
     binding, guides = bound_hair(rng, 9, 4)
     maker, reads, read = new_maker(binding, 9, np.eye(3)), [], strand_bounds.StrandBounds._read
     monkeypatch.setattr(strand_bounds.StrandBounds, "_read", lambda self: reads.append(0) or read(self))

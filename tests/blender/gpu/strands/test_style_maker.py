@@ -268,8 +268,8 @@ def slid(hair, rng, monkeypatch, one_program):
 
 
 def test_styles_above_a_slider_are_not_applied_again(hair, slid):
-    """While the slider of a style moves, strands stay as the styles before it leave them, also between the parts in
-    which strands are made; other changes apply these styles again.
+    """While a style's slider moves, the styles before it are not applied again, also if strands are made in parts;
+    other changes apply these styles again.
     """
     make, makers = slid
     frizzed = [(*SLID[:3], replace(SLID[3], amplitude=value)) for value in (0.002, 0.003, 0.004)]

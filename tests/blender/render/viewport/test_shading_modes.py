@@ -493,7 +493,7 @@ def test_the_scene_lights_hair_as_far_as_the_viewport_asks(ball, kind):
 
 def test_normals_of_surfaces_are_read_for_shadows_and_light_paths(ball, monkeypatch):
     """In Material Preview normals, which Blender computes for each pose, are read for light paths at rest and for
-    shadows on surfaces; the scene at rest has them also after frames that were played.
+    shadows on surfaces; after playback, the scene at rest has normals again.
     """
     ball.shading.type, ball.shading.use_scene_lights, ball.shading.use_scene_world = "MATERIAL", True, True
     context, state, is_playing = context_of(ball), bpy.context.scene.vellus, [True]

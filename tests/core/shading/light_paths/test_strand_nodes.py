@@ -118,7 +118,7 @@ def test_parts_of_light_are_all_of_it(rng):
 
 
 def test_a_lone_strand_has_no_later_light():
-    """A lamp lights it at once, also by paths that leave the strand toward the lamp."""
+    """All light of a lamp is direct, also by paths that leave the strand and hit the lamp."""
     grid = grid_of(np.linspace((-0.1, 0.0, -0.5), (0.1, 0.0, 0.5), 4)[None], WHITE, radius=0.05, voxel_count=30)
     lamps = sun((0.0, 1.0, 0.0))
     lamps["radius"] = 0.5
