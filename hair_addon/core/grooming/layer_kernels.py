@@ -152,7 +152,7 @@ def compose(layers: GuideLayers, guides: np.ndarray | None = None, out: np.ndarr
     """Return the points (N, 3) float32 of guides with their layers.
 
     guides: (M,) indices of the guides to be composed, None for all; out: (N, 3) float32, in which their points are
-    overwritten, None for a new array. Raises `HairError` for another number of points, and for missing guides.
+    overwritten, None for a new array. Raises `HairError` if points or guides do not fit the layers.
     """
     if out is None:
         out = np.empty((len(layers.base), 3), np.float32)

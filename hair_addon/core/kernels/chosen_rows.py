@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Kernels that run on all rows of arrays, or on chosen rows only.
 
-The first parameter of such a kernel contains the chosen rows, and none for all rows.
+The first parameter of such a kernel is an array of the chosen rows, which is empty for all rows.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def chosen_at(chosen: wp.array[int], row: int):
 
 
 def arguments(chosen: wp.array | None, device: wp.DeviceLike) -> tuple[Any, Callable[[wp.array], Any]]:
-    """Return the first argument of a launch, and a function of arrays with all rows that returns other arguments."""
+    """Return the first argument of a launch, and a function that makes other arguments from arrays with all rows."""
     if chosen is None:
         return wp.empty(0, dtype=int, device=device), Rows
     return Rows(chosen), lambda array: array
