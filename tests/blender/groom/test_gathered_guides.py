@@ -7,6 +7,7 @@ import pytest
 from mathutils import Matrix, Vector
 
 from hair_addon import api
+from hair_addon.blender.data.strands import gathered_groups
 from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
 from tests.support.reading import evaluated_points, points
@@ -75,13 +76,56 @@ def test_strands_lie_among_their_guides_behind_the_tie(guides, shape):
     add_line()
     api.change_guides(guides, "LENGTH", method="SET", length=6.0)  # all reach the tie
     gather(guides, shape=shape)
-    for _count in range(2):
+    for is_denser in (False, True):
+        if is_denser:
+            api.change_guides(guides, "COUNT", guide_count=2 * len(guides.data.curves))
+            bpy.context.view_layer.update()
         by_guides, by_strands = points(guides), points(bpy.data.objects["Hair"])
         behind = by_guides.shape[1] // 2
         least, most = by_guides[:, behind:].min(axis=0) - 1e-4, by_guides[:, behind:].max(axis=0) + 1e-4
         assert ((by_strands[:, behind:] >= least) & (by_strands[:, behind:] <= most)).all()
-        api.change_guides(guides, "COUNT", guide_count=2 * len(by_guides))
-        bpy.context.view_layer.update()
+
+
+def test_new_guides_go_through_the_tie(guides):
+    """Without layers too, guides between gathered guides are at means of their points behind the tie."""
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    gather(guides)
+    before = points(guides)
+    api.change_guides(guides, "COUNT", guide_count=2 * len(before))
+    added, behind = points(guides)[len(before) :], before.shape[1] * 3 // 4
+    least, most = before[:, behind:].min(axis=0) - 1e-4, before[:, behind:].max(axis=0) + 1e-4
+    assert len(added) and ((added[:, behind:] >= least) & (added[:, behind:] <= most)).all()
+
+
+def test_ties_stay_where_they_are_if_guides_are_cut(guides):
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    gather(guides, shape="BRAID")
+    lengths = []
+    for _time in range(2):
+        ties, along = gathered_groups.ties_of(guides.data), segments(points(guides)).cumsum(axis=1)
+        along = np.pad(along, ((0, 0), (1, 0)))
+        numbers = np.arange(along.shape[1])
+        lengths.append([np.interp(tie * numbers[-1], numbers, own) for tie, own in zip(ties, along, strict=True)])
+        api.change_guides(guides, "LENGTH", method="SET", length=4.0, shorten="CUT")
+    assert np.max(lengths[0]) < 4.0
+    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
+
+
+def test_transferred_guides_are_held_up_to_their_ties(guides):
+    """The length up to the tie, in local units, follows the surface's size in other units."""
+    add_line()
+    gather(guides)
+    other = guides.data.surface.copy()
+    other.data = other.data.copy()
+    other.data.transform(Matrix.Scale(100.0, 4))
+    bpy.context.scene.collection.objects.link(other)
+    bpy.context.view_layer.update()
+    copies = api.transfer_groom(guides, other).guides
+    found, expected = gathered_groups.read(copies), gathered_groups.read(guides.data)
+    np.testing.assert_array_equal(found.groups, expected.groups)
+    np.testing.assert_allclose(found.held, expected.held, rtol=1e-4)
 
 
 def test_a_line_through_the_surface_keeps_guides_outside(guides):

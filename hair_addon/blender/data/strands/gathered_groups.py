@@ -99,6 +99,32 @@ def scale(datablock, change):
     attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", scaled)
 
 
+def follow_cuts(datablock, before):
+    """Store where the ties of guides are after a tool has cut them; before (N, 3): their local points before it.
+
+    Points keep their fractions of a guide's length, so fewer of them are up to the tie before than after a cut.
+    """
+    ties = ties_of(datablock)
+    if ties is None:
+        return
+    after, starts = curves.read_points(datablock), curves.curve_offsets(datablock)
+    former, present = (_segment_lengths(np.nan_to_num(points), starts) for points in (before, after))
+    whole = [np.add.reduceat(lengths, starts[:-1]) for lengths in (former, present)]
+    for guide in np.flatnonzero((ties > 0.0) & (whole[1] < whole[0])):
+        first, last = starts[guide], starts[guide + 1] - 1
+        alongs = (np.append(0.0, lengths[first:last].cumsum()) for lengths in (former, present))
+        ties[guide] = _tie_along(*alongs, ties[guide])
+    attributes.write(datablock, TIE, "FLOAT", "CURVE", ties)
+
+
+def _tie_along(former, present, tie):
+    """Return the fraction of points where a guide is as long as it was at a tie; both lengths (P,) from the root."""
+    numbers = np.arange(len(former))
+    length = np.interp(tie * numbers[-1], numbers, former)
+    place = np.interp(length, present, numbers) if length < present[-1] else numbers[-1]
+    return place / max(numbers[-1], 1)
+
+
 def _segment_lengths(points, starts):
     """Return lengths (N,) float64 from each point to the next point of its guide, zero at tips."""
     found = np.append(np.linalg.norm(np.diff(points.astype(np.float64), axis=0), axis=1), 0.0)

@@ -172,6 +172,7 @@ def _between(guides, roots, depsgraph):
         lines=parting.lines,
         drawn_on=surface.drawn_on,
         is_mirrored=surface.has_flipped_winding,
+        ties=parting.ties,
         device=device,
     )
     point_count = max(int(np.bincount(guides.counts).argmax()), 2)

@@ -27,7 +27,7 @@ from ....core.grooming.guide_tool_settings import (
     TrimSettings,
 )
 from ...data import scene
-from ...data.strands import attributes, curves, cutters, frozen_points, guide_curves, posed_strands
+from ...data.strands import attributes, curves, cutters, frozen_points, gathered_groups, guide_curves, posed_strands
 from ...data.surfaces import Surface
 from ...host.notices import name_of
 from ...layers import recording
@@ -266,7 +266,10 @@ def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsg
     """Change the lengths of guides; returns the number changed. Raises `HairError` before anything changes."""
     guides = read(datablock, settings, depsgraph)
     resized = grooming.guide_lengths.resized
-    return reshape(guides, lambda points, chosen: resized(points, settings, guides.weights[chosen]))
+    changed = reshape(guides, lambda points, chosen: resized(points, settings, guides.weights[chosen]))
+    if settings.shorten == "CUT":
+        gathered_groups.follow_cuts(datablock, guides.local)
+    return changed
 
 
 def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int:
@@ -283,7 +286,9 @@ def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int
             crossings = grooming.guide_trim.plane_crossings(there, cutter.origin, cutter.normal)
         return grooming.guide_trim.trimmed(points, crossings, guides.weights[chosen])
 
-    return reshape(guides, shaped)
+    changed = reshape(guides, shaped)
+    gathered_groups.follow_cuts(datablock, guides.local)
+    return changed
 
 
 def smooth(datablock: Curves, settings: SmoothSettings, depsgraph: Depsgraph) -> int:

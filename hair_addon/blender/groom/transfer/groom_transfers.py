@@ -21,7 +21,15 @@ from ....core.grooming.groom_transfer import Places, TransferSurface
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Work
 from ...data import landmarks, scene, surface_space, usable_surfaces, whole_changes
-from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes, layer_attributes
+from ...data.strands import (
+    attributes,
+    curves,
+    curves_objects,
+    gathered_groups,
+    guide_curves,
+    kept_shapes,
+    layer_attributes,
+)
 from ...data.surfaces import Surface
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
@@ -185,6 +193,7 @@ def _write_guides(guides, source: CombedGuides, surface: Surface, places: Places
     scale = source.surface.scale * places.scale  # [m] per unit of former coordinates
     lost = np.setdiff1d(np.arange(len(guides.curves)), places.kept)
     guide_curves.remove(guides, lost)
+    gathered = gathered_groups.read(guides)  # parts of the former lengths
     starts = curves.curve_offsets(guides)
     _move_layers(guides, source, surface, places)
     apart = np.linalg.norm(points[starts[:-1]] - positions(surface.mesh, places.roots), axis=1)
@@ -198,6 +207,8 @@ def _write_guides(guides, source: CombedGuides, surface: Surface, places: Places
     if len(guides.vellus.layers):
         guides.vellus.is_base_grown = False
         recording.note_shape(guides)
+    if gathered is not None:
+        gathered_groups.write(guides, gathered)
     curves.write_roots(guides, surface, places.roots)
     attributes.write(guides, "root_distance", "FLOAT", "CURVE", apart / surface.scale)
     surface_space.keep_surface(guides, surface)
