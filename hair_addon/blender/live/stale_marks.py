@@ -7,7 +7,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import masks, scene, usable_surfaces
-from ..data.strands import curves, drawn_lines
+from ..data.strands import curves, drawn_lines, gathered_groups
 from ..groom import bindings, frame_faces, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces, kept_densities
 from ..groom.surfaces.edited_surfaces import Followed
@@ -189,9 +189,9 @@ def _parts_by(hair, changed, transformed):
     state = hair.vellus
     if drawn_lines.have_moved(text_of(state.hair, "part_lines"), curves.grown_on(hair), changed, transformed):
         return True
-    # Guides are read with each step of a stroke, so only if they have a region attribute.
-    guides = state.guide_curves
-    return guides is not None and guides in changed and text_of(state.hair, "region_attribute") in guides.attributes
+    # Guides are read with each step of a stroke, so only if they have a region attribute or ties.
+    guides, names = state.guide_curves, (text_of(state.hair, "region_attribute"), gathered_groups.TIE)
+    return guides is not None and guides in changed and any(name in guides.attributes for name in names)
 
 
 def images_of(target):

@@ -8,6 +8,7 @@ from mathutils import Matrix, Vector
 
 from hair_addon import api
 from hair_addon.blender.data.strands import gathered_groups
+from hair_addon.blender.groom import pipeline
 from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
 from tests.support.reading import evaluated_points, points
@@ -126,6 +127,21 @@ def test_transferred_guides_are_held_up_to_their_ties(guides):
     found, expected = gathered_groups.read(copies), gathered_groups.read(guides.data)
     np.testing.assert_array_equal(found.groups, expected.groups)
     np.testing.assert_allclose(found.held, expected.held, rtol=1e-4)
+
+
+def test_hair_in_regions_of_its_surface_follows_new_ties(guides):
+    """Hair with other regions than those of gathered guides is bound to their ties at once, and to later ones."""
+    mesh, hair = bpy.data.objects["Sphere"].data, bpy.data.objects["Hair"]
+    mesh.attributes.new("side", "INT", "FACE")
+    mesh.update()
+    hair.data.vellus.hair.region_attribute = "side"
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    for shape in ("PONYTAIL", "BRAID"):
+        gather(guides, shape=shape)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        anew = pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph)
+        np.testing.assert_allclose(points(hair), anew.points, atol=1e-5)
 
 
 def test_a_line_through_the_surface_keeps_guides_outside(guides):
