@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from hair_addon import api
 from hair_addon.blender.data.made import groom_assets
-from hair_addon.blender.data.strands import gathered_groups, selection_sets
+from hair_addon.blender.data.strands import attributes, gathered_groups, selection_sets
 from hair_addon.blender.io import asset_catalogs, groom_library
 from hair_addon.core.errors import HairError
 from tests.support.dynamics.following import update
@@ -82,16 +82,19 @@ def test_regions_ties_and_selections_of_guides_come_along(groom, sphere, tmp_pat
     guides, hair = groom
     parts = (api.points(guides)[:, 0, 0] > 0.0).astype(np.int32)
     fractions = np.linspace(0.1, 0.9, len(parts), dtype=np.float32)
-    gathered = gathered_groups.Gathered(1 + parts, fractions, fractions[::-1])
-    gathered_groups.write(guides, gathered)
+    gathered_groups.write(guides, gathered_groups.Gathered(1 + parts, fractions, fractions[::-1]))
+    api.change_guides(guides, "LENGTH", method="SCALE", factor=0.5)  # the parts up to ties are longer
+    gathered = gathered_groups.read(guides)
+    attributes.write(guides, "parts", "INT", "CURVE", parts)
     selection_sets.write(guides, "Left", np.repeat(parts > 0, len(guides.points) // len(parts)))
-    hair.vellus.hair.region_attribute = gathered_groups.NAME
+    hair.vellus.hair.region_attribute = "parts"
     update()
     file = api.save_groom(hair, tmp_path, name="Parted", catalog="", picture=PICTURE)
     its_guides, its_hair = api.apply_groom(sphere, file)
     its = gathered_groups.read(its_guides)
-    for found, wanted in zip((its.groups, its.held, its.ties), (1 + parts, fractions, fractions[::-1]), strict=True):
-        np.testing.assert_allclose(found, wanted, atol=1e-5)
+    for name in ("groups", "held", "ties"):
+        np.testing.assert_allclose(getattr(its, name), getattr(gathered, name), atol=1e-5)
+    assert attributes.has(its_guides, "gathered_length", "FLOAT", "CURVE")
     np.testing.assert_array_equal(selection_sets.read_guides(its_guides, "Left"), parts > 0)
     assert api.settings_of(its_hair) == api.settings_of(hair) and its_hair.vellus.status == ""
     update()

@@ -93,11 +93,14 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     for mask in library_settings.masks_of(settings):
         if mask in surface_object.vertex_groups:
             masks[mask] = scene.read_vertex_group(surface_object, depsgraph, mask)
-    of_ties = (gathered_groups.HELD, gathered_groups.TIE) if gathered_groups.groups_of(guides) is not None else ()
-    for region in (settings.hair.region_attribute, *of_ties, *library_settings.masks_of(settings)):
+    for region in (settings.hair.region_attribute, *library_settings.masks_of(settings)):
         values = _of_guides(guides, region)
         if values is not None:
             regions[region] = values
+    gathered = gathered_groups.read(guides)
+    if gathered is not None:
+        names = gathered_groups.NAME, gathered_groups.HELD, gathered_groups.TIE
+        regions.update(zip(names, (gathered.groups, gathered.held, gathered.ties), strict=True))
     for selection in selection_names.names_of(guides):
         are_chosen = selection_sets.read_guides(guides, selection)
         if are_chosen is not None:
@@ -217,6 +220,14 @@ def _drawn(groom, surface_object, kept, points):
     return drawn
 
 
+def _keep_gathered(guides):
+    """Store the lengths of guides up to ties, which a groom has as parts; returns whether guides are gathered."""
+    gathered = gathered_groups.read(guides)
+    if gathered is not None:
+        gathered_groups.write(guides, gathered)
+    return gathered is not None
+
+
 def _keep_selections(guides):
     """Save the selections of a groom, which has a number for each guide; returns whether there are any."""
     names = [name for name in guides.attributes.keys() if name.startswith(selection_names.PREFIX)]
@@ -233,9 +244,9 @@ def _keep_settings(made, settings):
     setting_properties.assign(made.guides.vellus.guides, settings.guides)
     if settings.hair.density_group == settings.guides.density_group:
         made.hair.vellus.hair.density_group = ""  # strands use the mask of the guides, which exist now
-    has_selections = _keep_selections(made.guides)
+    are_others = [_keep_selections(made.guides), _keep_gathered(made.guides)]
     made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
-    if settings.hair.region_attribute or has_selections:
+    if settings.hair.region_attribute or any(are_others):
         pipeline.evaluate(made.hair, scene.present_depsgraph())
     for target in (made.guides, made.hair):
         target.vellus.is_stale = False
