@@ -189,7 +189,7 @@ def _parts_by(hair, changed, transformed):
     state = hair.vellus
     if drawn_lines.have_moved(text_of(state.hair, "part_lines"), curves.grown_on(hair), changed, transformed):
         return True
-    # Guides are read with each step of a stroke, so only if they have a region attribute or ties.
+    # Each step of a stroke would read the guides, so they are read only if they have a region attribute or ties.
     guides, names = state.guide_curves, (text_of(state.hair, "region_attribute"), gathered_groups.TIE)
     return guides is not None and guides in changed and any(name in guides.attributes for name in names)
 

@@ -88,7 +88,7 @@ def test_strands_lie_among_their_guides_behind_the_tie(guides, shape):
 
 
 def test_new_guides_go_through_the_tie(guides):
-    """Without layers too, guides between gathered guides are at means of their points behind the tie."""
+    """Behind the tie, new guides are means of gathered guides, also without layers."""
     add_line()
     api.change_guides(guides, "LENGTH", method="SET", length=6.0)
     gather(guides)
@@ -115,7 +115,7 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
 
 
 def test_transferred_guides_are_held_up_to_their_ties(guides):
-    """The length up to the tie, in local units, follows the surface's size in other units."""
+    """The length up to the tie, in local units, is scaled with the surface."""
     add_line()
     gather(guides)
     other = guides.data.surface.copy()
@@ -130,7 +130,7 @@ def test_transferred_guides_are_held_up_to_their_ties(guides):
 
 
 def test_hair_in_regions_of_its_surface_follows_new_ties(guides):
-    """Hair with other regions than those of gathered guides is bound to their ties at once, and to later ones."""
+    """Hair with regions of its surface is bound to new ties of its guides at once."""
     mesh, hair = bpy.data.objects["Sphere"].data, bpy.data.objects["Hair"]
     mesh.attributes.new("side", "INT", "FACE")
     mesh.update()

@@ -83,7 +83,7 @@ def test_regions_ties_and_selections_of_guides_come_along(groom, sphere, tmp_pat
     parts = (api.points(guides)[:, 0, 0] > 0.0).astype(np.int32)
     fractions = np.linspace(0.1, 0.9, len(parts), dtype=np.float32)
     gathered_groups.write(guides, gathered_groups.Gathered(1 + parts, fractions, fractions[::-1]))
-    api.change_guides(guides, "LENGTH", method="SCALE", factor=0.5)  # the parts up to ties are longer
+    api.change_guides(guides, "LENGTH", method="SCALE", factor=0.5)  # a greater fraction is up to the tie
     gathered = gathered_groups.read(guides)
     attributes.write(guides, "parts", "INT", "CURVE", parts)
     selection_sets.write(guides, "Left", np.repeat(parts > 0, len(guides.points) // len(parts)))

@@ -100,9 +100,9 @@ def scale(datablock, change):
 
 
 def follow_cuts(datablock, before):
-    """Store where the ties of guides are after a tool has cut them; before (N, 3): their local points before it.
+    """Update the ties of guides that a tool has cut; before: (N, 3), their local points before the cut.
 
-    Points keep their fractions of a guide's length, so fewer of them are up to the tie before than after a cut.
+    Points keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
     """
     ties = ties_of(datablock)
     if ties is None:
@@ -118,7 +118,7 @@ def follow_cuts(datablock, before):
 
 
 def _tie_along(former, present, tie):
-    """Return the fraction of points where a guide is as long as it was at a tie; both lengths (P,) from the root."""
+    """Return the tie of a cut guide at the length of its former tie; former, present: (P,) lengths from the root."""
     numbers = np.arange(len(former))
     length = np.interp(tie * numbers[-1], numbers, former)
     place = np.interp(length, present, numbers) if length < present[-1] else numbers[-1]

@@ -193,7 +193,7 @@ def _write_guides(guides, source: CombedGuides, surface: Surface, places: Places
     scale = source.surface.scale * places.scale  # [m] per unit of former coordinates
     lost = np.setdiff1d(np.arange(len(guides.curves)), places.kept)
     guide_curves.remove(guides, lost)
-    gathered = gathered_groups.read(guides)  # parts of the former lengths
+    gathered = gathered_groups.read(guides)  # fractions of the former lengths
     starts = curves.curve_offsets(guides)
     _move_layers(guides, source, surface, places)
     apart = np.linalg.norm(points[starts[:-1]] - positions(surface.mesh, places.roots), axis=1)

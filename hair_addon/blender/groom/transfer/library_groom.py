@@ -221,7 +221,7 @@ def _drawn(groom, surface_object, kept, points):
 
 
 def _keep_gathered(guides):
-    """Store the lengths of guides up to ties, which a groom has as parts; returns whether guides are gathered."""
+    """Store the lengths of guides up to their ties, which a groom has as fractions; returns whether there are any."""
     gathered = gathered_groups.read(guides)
     if gathered is not None:
         gathered_groups.write(guides, gathered)
@@ -244,9 +244,9 @@ def _keep_settings(made, settings):
     setting_properties.assign(made.guides.vellus.guides, settings.guides)
     if settings.hair.density_group == settings.guides.density_group:
         made.hair.vellus.hair.density_group = ""  # strands use the mask of the guides, which exist now
-    are_others = [_keep_selections(made.guides), _keep_gathered(made.guides)]
+    are_kept = [_keep_selections(made.guides), _keep_gathered(made.guides)]
     made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
-    if settings.hair.region_attribute or any(are_others):
+    if settings.hair.region_attribute or any(are_kept):
         pipeline.evaluate(made.hair, scene.present_depsgraph())
     for target in (made.guides, made.hair):
         target.vellus.is_stale = False
