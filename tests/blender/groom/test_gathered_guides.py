@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix, Vector
 
 from hair_addon import api
-from hair_addon.blender.data.strands import gathered_groups
+from hair_addon.blender.data.strands import curves, gathered_groups
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
@@ -112,6 +112,20 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
         api.change_guides(guides, "LENGTH", method="SET", length=4.0, shorten="CUT")
     assert np.max(lengths[0]) < 4.0
     np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
+
+
+def test_ties_of_guides_with_fewer_points_than_strands(guides):
+    """Strands follow guides at equal spacing; guides of another number of points have shorter segments near roots."""
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    some = np.ascontiguousarray(points(guides)[:, np.linspace(0, 40, 21).astype(int)])
+    guides.data.resize_curves([21] * len(some))
+    guides.data.attributes["position"].data.foreach_set("vector", some.ravel())
+    guides.data.update_tag()
+    gather(guides, shape="BUN")
+    even, ties = curves.even_local_points(guides.data), gathered_groups.ties_of(guides.data)
+    at_tie = even[np.arange(len(even)), np.rint(40.0 * ties).astype(int)]
+    assert even.shape[1] == 41 and np.linalg.norm(at_tie - LINE[0], axis=1).max() < 0.3
 
 
 def test_transferred_guides_are_held_up_to_their_ties(guides):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....core import geometry
+from ....core.grooming.groom import POINT_COUNT
 from . import attributes, curves
 
 NAME = "gathered"
@@ -21,7 +22,8 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 @dataclass(frozen=True)
 class Gathered:
     """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the fraction of the present length up
-    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie.
+    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, at
+    equal spacing if guides have other numbers of points than strands.
     """
 
     groups: np.ndarray
@@ -107,22 +109,46 @@ def follow_cuts(datablock, before):
     ties = ties_of(datablock)
     if ties is None:
         return
-    after, starts = curves.read_points(datablock), curves.curve_offsets(datablock)
-    former, present = (_segment_lengths(np.nan_to_num(points), starts) for points in (before, after))
-    whole = [np.add.reduceat(lengths, starts[:-1]) for lengths in (former, present)]
-    for guide in np.flatnonzero((ties > 0.0) & (whole[1] < whole[0])):
-        first, last = starts[guide], starts[guide + 1] - 1
-        alongs = (np.append(0.0, lengths[first:last].cumsum()) for lengths in (former, present))
-        ties[guide] = _tie_along(*alongs, ties[guide])
+    former, present = (_along(_even(datablock, points)) for points in (before, curves.read_points(datablock)))
+    for guide in np.flatnonzero((ties > 0.0) & (present[:, -1] < former[:, -1])):
+        ties[guide] = _part_at(present[guide], _length_at(former[guide], ties[guide]))
     attributes.write(datablock, TIE, "FLOAT", "CURVE", ties)
 
 
-def _tie_along(former, present, tie):
-    """Return the tie of a cut guide at the length of its former tie; former, present: (P,) lengths from the root."""
-    numbers = np.arange(len(former))
-    length = np.interp(tie * numbers[-1], numbers, former)
-    place = np.interp(length, present, numbers) if length < present[-1] else numbers[-1]
-    return place / max(numbers[-1], 1)
+def of_even_points(datablock, ties):
+    """Return ties (G,) as parts of the points with which strands follow guides; ties: as parts of their own points."""
+    points, starts = np.nan_to_num(curves.read_points(datablock)), curves.curve_offsets(datablock)
+    found = np.array(ties, np.float32)
+    if (np.diff(starts) == POINT_COUNT).all():
+        return found
+    along = _along(_even(datablock, points))
+    for guide in np.flatnonzero(found > 0.0):
+        own = _along(points[None, starts[guide] : starts[guide + 1]])[0]
+        found[guide] = _part_at(along[guide], _length_at(own, found[guide]))
+    return found
+
+
+def _even(datablock, points):
+    """Return local points (N, 3) of guides as strands follow them, (G, P, 3)."""
+    return curves.even_points(
+        np.nan_to_num(points), curves.curve_offsets(datablock), lambda: attributes.are_smooth(datablock)
+    )
+
+
+def _along(points):
+    """Return the lengths (G, P) from the root to each point (G, P, 3)."""
+    lengths = np.linalg.norm(np.diff(points.astype(np.float64), axis=1), axis=2).cumsum(axis=1)
+    return np.pad(lengths, ((0, 0), (1, 0)))
+
+
+def _length_at(along, part):
+    """Return the length at a part of the points of a guide with lengths (P,)."""
+    return np.interp(part * (len(along) - 1), np.arange(len(along)), along)
+
+
+def _part_at(along, length):
+    """Return the part of the points of a guide with lengths (P,) up to a length; 1 beyond the tip."""
+    return np.interp(length, along, np.arange(len(along))) / max(len(along) - 1, 1) if length < along[-1] else 1.0
 
 
 def _segment_lengths(points, starts):

@@ -42,6 +42,7 @@ def gather(datablock: Curves, settings: GatherSettings, depsgraph: Depsgraph) ->
     if not groups.any():
         raise HairError("No guides were gathered, because the ties are on another part of the surface: move the curve.")
     changed = guide_tools.write_shapes(guides, after)
+    joins = gathered_groups.of_even_points(datablock, joins)
     groups = np.where(guides.weights >= _MEMBER, groups, 0)
     gathered_groups.add(datablock, gathered_groups.Gathered(groups, held, joins))
     _part_hair(datablock)
