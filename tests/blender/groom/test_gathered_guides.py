@@ -112,6 +112,10 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
         api.change_guides(guides, "LENGTH", method="SET", length=4.0, shorten="CUT")
     assert np.max(lengths[0]) < 4.0
     np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
+    held, ties = gathered_groups.read(guides.data).held, gathered_groups.ties_of(guides.data)
+    api.change_guides(guides, "LENGTH", method="SCALE", factor=1.5)  # scaled guides keep their parts
+    np.testing.assert_allclose(gathered_groups.read(guides.data).held, held, rtol=1e-5)
+    np.testing.assert_array_equal(gathered_groups.ties_of(guides.data), ties)
 
 
 def test_ties_of_guides_with_fewer_points_than_strands(guides):

@@ -16,6 +16,7 @@ NAME = "gathered"
 HELD = "gathered_held"
 TIE = "gathered_tie"
 _LENGTH = "gathered_length"  # up to the tie, in local units
+_PER_GUIDE = "FLOAT", "CURVE"
 _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 
 
@@ -101,18 +102,26 @@ def scale(datablock, change):
     attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", scaled)
 
 
-def follow_cuts(datablock, before):
-    """Update the ties of guides that a tool has cut; before: (N, 3), their local points before the cut.
+def follow_lengths(datablock, before, cuts):
+    """Update ties, and lengths up to ties, of guides that a tool has cut or scaled; before: (N, 3), their local points
+    before it.
 
-    Points keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
+    cuts: whether shorter guides are cut, and not scaled. Points keep their fractions of a guide's length, so after a
+    cut a greater part of them is up to the tie.
     """
-    ties = ties_of(datablock)
-    if ties is None:
+    groups, ties, lengths = groups_of(datablock), ties_of(datablock), attributes.read(datablock, _LENGTH, *_PER_GUIDE)
+    if groups is None:
         return
     former, present = (_along(_even(datablock, points)) for points in (before, curves.read_points(datablock)))
-    for guide in np.flatnonzero((ties > 0.0) & (present[:, -1] < former[:, -1])):
-        ties[guide] = _part_at(present[guide], _length_at(former[guide], ties[guide]))
-    attributes.write(datablock, TIE, "FLOAT", "CURVE", ties)
+    whole = former[:, -1]
+    is_cut = (present[:, -1] < whole) if cuts else np.zeros(len(groups), bool)
+    if ties is not None:
+        for guide in np.flatnonzero((ties > 0.0) & is_cut):
+            ties[guide] = _part_at(present[guide], _length_at(former[guide], ties[guide]))
+        attributes.write(datablock, TIE, *_PER_GUIDE, ties)
+    if lengths is not None:
+        scales = np.where(is_cut | (whole <= 0.0), 1.0, present[:, -1] / np.maximum(whole, 1e-30))
+        attributes.write(datablock, _LENGTH, *_PER_GUIDE, lengths * scales)
 
 
 def of_even_points(datablock, ties):

@@ -267,8 +267,7 @@ def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsg
     guides = read(datablock, settings, depsgraph)
     resized = grooming.guide_lengths.resized
     changed = reshape(guides, lambda points, chosen: resized(points, settings, guides.weights[chosen]))
-    if settings.shorten == "CUT":
-        gathered_groups.follow_cuts(datablock, guides.local)
+    gathered_groups.follow_lengths(datablock, guides.local, cuts=settings.shorten == "CUT")
     return changed
 
 
@@ -287,7 +286,7 @@ def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int
         return grooming.guide_trim.trimmed(points, crossings, guides.weights[chosen])
 
     changed = reshape(guides, shaped)
-    gathered_groups.follow_cuts(datablock, guides.local)
+    gathered_groups.follow_lengths(datablock, guides.local, cuts=True)
     return changed
 
 
