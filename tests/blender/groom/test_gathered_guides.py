@@ -113,13 +113,13 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
     assert np.max(lengths[0]) < 4.0
     np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
     held, ties = gathered_groups.read(guides.data).held, gathered_groups.ties_of(guides.data)
-    api.change_guides(guides, "LENGTH", method="SCALE", factor=1.5)  # scaled guides keep their parts
+    api.change_guides(guides, "LENGTH", method="SCALE", factor=1.5)  # scaled guides keep their fractions
     np.testing.assert_allclose(gathered_groups.read(guides.data).held, held, rtol=1e-5)
     np.testing.assert_array_equal(gathered_groups.ties_of(guides.data), ties)
 
 
 def test_ties_of_guides_with_fewer_points_than_strands(guides):
-    """Strands follow guides at equal spacing; guides of another number of points have shorter segments near roots."""
+    """Strands follow guides with points at equal spacing, but gathered guides have shorter segments near roots."""
     add_line()
     api.change_guides(guides, "LENGTH", method="SET", length=6.0)
     some = np.ascontiguousarray(points(guides)[:, np.linspace(0, 40, 21).astype(int)])

@@ -23,8 +23,8 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 @dataclass(frozen=True)
 class Gathered:
     """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the fraction of the present length up
-    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, at
-    equal spacing if guides have other numbers of points than strands.
+    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, counted on
+    guides that have as many points as strands, which are resampled at equal spacing if they do not.
     """
 
     groups: np.ndarray
@@ -103,11 +103,10 @@ def scale(datablock, change):
 
 
 def follow_lengths(datablock, before, cuts):
-    """Update ties, and lengths up to ties, of guides that a tool has cut or scaled; before: (N, 3), their local points
-    before it.
+    """Update ties, and the lengths up to ties, of guides that a tool has cut or scaled.
 
-    cuts: whether shorter guides are cut, and not scaled. Points keep their fractions of a guide's length, so after a
-    cut a greater part of them is up to the tie.
+    before: (N, 3), their local points before the change; cuts: whether shorter guides are cut instead of scaled. Points
+    keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
     """
     groups, ties, lengths = groups_of(datablock), ties_of(datablock), attributes.read(datablock, _LENGTH, *_PER_GUIDE)
     if groups is None:
@@ -125,7 +124,7 @@ def follow_lengths(datablock, before, cuts):
 
 
 def of_even_points(datablock, ties):
-    """Return ties (G,) as parts of the points with which strands follow guides; ties: as parts of their own points."""
+    """Return ties (G,) as fractions of the points that strands follow; ties: as fractions of the guides' own points."""
     points, starts = np.nan_to_num(curves.read_points(datablock)), curves.curve_offsets(datablock)
     found = np.array(ties, np.float32)
     if (np.diff(starts) == POINT_COUNT).all():
@@ -138,7 +137,7 @@ def of_even_points(datablock, ties):
 
 
 def _even(datablock, points):
-    """Return local points (N, 3) of guides as strands follow them, (G, P, 3)."""
+    """Return local points (N, 3) of guides as points (G, P, 3) that strands follow."""
     return curves.even_points(
         np.nan_to_num(points), curves.curve_offsets(datablock), lambda: attributes.are_smooth(datablock)
     )
@@ -151,12 +150,12 @@ def _along(points):
 
 
 def _length_at(along, part):
-    """Return the length at a part of the points of a guide with lengths (P,)."""
+    """Return the length at a fraction of the points of a guide with lengths (P,)."""
     return np.interp(part * (len(along) - 1), np.arange(len(along)), along)
 
 
 def _part_at(along, length):
-    """Return the part of the points of a guide with lengths (P,) up to a length; 1 beyond the tip."""
+    """Return the fraction of the points of a guide with lengths (P,) up to a length; 1 beyond the tip."""
     return np.interp(length, along, np.arange(len(along))) / max(len(along) - 1, 1) if length < along[-1] else 1.0
 
 
