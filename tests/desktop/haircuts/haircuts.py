@@ -196,6 +196,11 @@ FADE = (
     press("vellus.apply_preset", preset="BLACK"),
 )
 
+FLYAWAYS = (  # a few hairs that stand out
+    press("vellus.add_style", style="FRIZZ"),
+    fields("Frizz", amplitude=2.0e-4, wavelength=0.05, stray=0.02, stray_gain=12.0),
+)
+
 TAIL = ((0.0, 0.040, 0.795), (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.090, 0.74), (0.0, 0.085, 0.60))
 
 PONYTAIL = (
@@ -204,6 +209,7 @@ PONYTAIL = (
     curve("Tie", TAIL, depth="CURSOR"),
     select("Head"),
     press("vellus.gather_guides", line="Tie", shape="PONYTAIL"),
+    *FLYAWAYS,
     press("vellus.apply_preset", preset="LIGHT_BROWN"),
 )
 
@@ -213,7 +219,14 @@ BUN = (
     lines("vellus.draw_tie", ((0.0, 0.055, 0.80), (0.0, 0.055, 0.83))),
     select("Head"),
     press("vellus.gather_guides", shape="BUN"),
+    *FLYAWAYS,
     press("vellus.apply_preset", preset="GINGER"),
+)
+
+# From the skin behind the left ear.
+OVER_SHOULDER = (
+    *((0.050, 0.004, 0.705), (0.054, 0.008, 0.680), (0.058, 0.0, 0.655), (0.062, -0.03, 0.632)),
+    *((0.068, -0.09, 0.600), (0.074, -0.125, 0.560), (0.089, -0.14, 0.460)),
 )
 
 BRAIDS = (
@@ -223,16 +236,13 @@ BRAIDS = (
     view(*BACK),
     lines("vellus.draw_parting", ((0.0, 0.04, 0.82), (0.0, 0.065, 0.76), (0.0, 0.05, 0.69), (0.0, 0.04, 0.66))),
     view(0, 1, 0),
-    cursor(0.080, 0.0, 0.70),
-    view(*SIDE),
-    curve(
-        "Ties",
-        ((0.08, 0.010, 0.700), (0.08, 0.012, 0.670), (0.08, -0.03, 0.63), (0.08, -0.105, 0.585), (0.08, -0.125, 0.46)),
-        depth="CURSOR",
-        is_mirrored=True,
-    ),
+    cursor(*OVER_SHOULDER[0]),
+    view(1.0, 0.0, 0.16),  # so that the line goes outward on its way down
+    curve("Ties", OVER_SHOULDER, depth="CURSOR", is_mirrored=True),
     select("Head"),
-    press("vellus.gather_guides", line="Ties", shape="BRAID", tail_radius=0.014),
+    press("vellus.gather_guides", line="Ties", shape="BRAID", tail_radius=0.019, tie_radius=0.009),
+    fields("hair", point_count=97),  # locks bend without corners
+    *FLYAWAYS,
     press("vellus.apply_preset", preset="AUBURN"),
 )
 
@@ -258,6 +268,7 @@ CORNROWS = (
     lines("vellus.draw_tie", *TO_NAPE, use_stroke_endpoints=False),
     select("Head"),
     press("vellus.gather_guides", shape="CORNROWS", tie_radius=0.0065),
+    *FLYAWAYS,
     press("vellus.apply_preset", preset="DARK_BROWN"),
 )
 
