@@ -23,8 +23,8 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 @dataclass(frozen=True)
 class Gathered:
     """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the fraction of the present length up
-    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, counted on
-    guides that have as many points as strands, which are resampled at equal spacing if they do not.
+    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, after
+    guides with other numbers of points than strands are resampled at equal spacing.
     """
 
     groups: np.ndarray
