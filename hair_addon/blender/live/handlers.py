@@ -423,4 +423,5 @@ def unregister():
     hidden_previews.unregister()
     kept_densities.unregister()
     live_hair.write_all()
+    live_hair.cancel_writing()  # of hair that waits for its next evaluation
     composite.suspend()

@@ -260,13 +260,35 @@ def is_ahead(hair):
 
 
 def write_all(*_args):
-    """Write all hair that is newer than its datablock: at the end of an interaction, or before it is read."""
-    cancel_writing()
+    """Write all hair that is newer than its datablock: at the end of an interaction, or before it is read.
+
+    Hair whose settings have changed since is left to the next evaluation, as writing stores the former settings.
+    """
+    if _write_newer():
+        cancel_writing()
+
+
+def _write_newer():
+    """Write hair that is newer than its datablock; returns whether none is left to the next evaluation."""
+    is_complete = True
     for hair in bpy.data.hair_curves:
         bound = bindings.of(hair)
         if bound is not None and not bound.is_written:
-            _write(hair)
+            if hair.vellus.is_stale and _has_other_settings(hair, bound):
+                is_complete = False
+            else:
+                _write(hair)
         strand_maps.write_pending(hair)
+    return is_complete
+
+
+def _has_other_settings(hair, bound):
+    """Whether settings have changed since hair was bound. A script of a timer may change them between two updates."""
+    try:
+        _guide_curves, settings = pipeline.inputs_of(hair)
+        return bound.settings != settings or bound.styles.read.styles != style_items.styles_of(hair.vellus)
+    except HairError:
+        return False  # `regenerate` handles it
 
 
 def _write(hair):
@@ -327,7 +349,9 @@ def write_after_pause():
     """Timer: write hair unless a stroke is running; returns the seconds until the next try, or None."""
     if is_stroke_running():
         return _PAUSE
-    write_all()
+    if not _write_newer():
+        return _PAUSE
+    cancel_writing()
     return None
 
 

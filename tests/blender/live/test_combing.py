@@ -136,6 +136,20 @@ def test_a_pause_writes_unless_the_stroke_goes_on(hair, in_window, monkeypatch):
     assert not bpy.app.timers.is_registered(live_hair.write_after_pause)
 
 
+def test_a_pause_keeps_settings_that_changed_since_the_last_update(hair, in_window):
+    """A script of a timer may change settings before hair with the former ones is written."""
+    settings = hair.data.vellus.hair
+    settings.seed = 9
+    bpy.context.view_layer.update()
+    settings.strand_count = 200
+    assert live_hair.write_after_pause() > 0.0
+    live_hair.write_all()
+    assert settings.strand_count == 200 and hair.data.vellus.is_stale
+    bpy.context.view_layer.update()
+    assert live_hair.write_after_pause() is None
+    assert len(hair.data.curves) == settings.strand_count == 200 and not hair.data.vellus.is_stale
+
+
 @pytest.mark.parametrize("reader", ["save", "render", "unregister"])
 def test_hair_is_written_before_it_is_read(hair, in_window, reader, tmp_path):
     guides = bpy.data.objects["Guides"]
