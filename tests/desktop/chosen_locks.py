@@ -24,6 +24,7 @@ from tests.desktop.window import (  # noqa: E402
     offscreen_light,
     places,
     refine_to,
+    remove_objects,
     take_picture,
     viewport,
     wait,
@@ -39,8 +40,7 @@ def begin():
     install(ZIP)
     refine_to(2)
     bpy.context.preferences.system.use_region_overlap = False
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    remove_objects()
     area, _region = viewport()
     area.spaces.active.overlay.show_extras = area.spaces.active.overlay.show_floor = False
     area.spaces.active.region_3d.view_distance = 4.5

@@ -25,6 +25,7 @@ from tests.desktop.window import (  # noqa: E402
     of_kind,
     places,
     refine_to,
+    remove_objects,
     take_picture,
     viewport,
     wait,
@@ -80,8 +81,7 @@ def groom():
     """
     install(ZIP)
     refine_to()
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    remove_objects()
     with in_viewport():
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
         bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=80, length=0.5, strand_count=500, radius=0.005)

@@ -28,6 +28,7 @@ from tests.desktop.window import (  # noqa: E402
     offscreen_light,
     places,
     refine_to,
+    remove_objects,
     take_picture,
     viewport,
     wait,
@@ -55,8 +56,7 @@ def begin():
     install(ZIP)
     refine_to(1)
     bpy.context.preferences.system.use_region_overlap = False
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    remove_objects()
     area, _region = viewport()
     area.spaces.active.overlay.show_extras = area.spaces.active.overlay.show_floor = False
     if PART in ("tiger", "calico"):

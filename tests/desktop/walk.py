@@ -30,6 +30,7 @@ from tests.desktop.window import (  # noqa: E402
     press,
     rectangle,
     refine_to,
+    remove_objects,
     shaders_compiled,
     take_picture,
     viewport,
@@ -85,8 +86,7 @@ def install():
 
 def head():
     """Show the sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    remove_objects()
     head_object = import_head()
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 4.0, (0.9, 0.2, 0.4)

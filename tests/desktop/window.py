@@ -44,6 +44,12 @@ def refine_to(sample_count=2):
     addon().gpu.ambient_visibility._SIZE, addon().gpu.ambient_visibility._LEAST_STRANDS = 64, 600
 
 
+def remove_objects():
+    """Remove all objects of the file."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+
+
 def window():
     return bpy.context.window_manager.windows[0]
 

@@ -179,8 +179,8 @@ def cached_faces(mesh_object, mesh, is_own=True):
     """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
     is_own: whether the mesh is the object's own, not an instance of Geometry Nodes. Reading the starts of polygons is
-    the slowest part. With the same vertices and edges at corners and the same number of polygons, the
-    polygons are the same: the last edge of each leads back to its first vertex.
+    the slowest part. With the same vertices and edges at corners and the same number of polygons, the polygons are the
+    same: the last edge of each leads back to its first vertex.
     """
     if _faces_read is None or not is_own:
         return _known_faces(mesh_object.session_uid, mesh)

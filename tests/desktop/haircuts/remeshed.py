@@ -22,6 +22,7 @@ from tests.desktop.window import (  # noqa: E402
     install,
     mask_scalp,
     refine_to,
+    remove_objects,
     take_picture,
     wait,
     wait_for,
@@ -56,8 +57,7 @@ def guides():
 def comb():
     install(ZIP)
     refine_to(1)
-    for thing in list(bpy.data.objects):
-        bpy.data.objects.remove(thing)
+    remove_objects()
     mask_scalp(import_head())
     yield from wait(0.5)
     for step in STYLED:

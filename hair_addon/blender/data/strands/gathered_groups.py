@@ -16,7 +16,7 @@ NAME = "gathered"
 HELD = "gathered_held"
 TIE = "gathered_tie"
 _LENGTH = "gathered_length"  # up to the tie, in local units
-_PER_GUIDE = "FLOAT", "CURVE"
+_FLOAT_PER_GUIDE = "FLOAT", "CURVE"
 _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 
 
@@ -43,7 +43,7 @@ def groups_of(datablock):
 
 def ties_of(datablock):
     """Return the ties (G,) float32 of guides as in `Gathered`; None if no guide is gathered."""
-    groups, ties = groups_of(datablock), attributes.read(datablock, TIE, "FLOAT", "CURVE")
+    groups, ties = groups_of(datablock), attributes.read(datablock, TIE, *_FLOAT_PER_GUIDE)
     if groups is None or ties is None:  # strands of files from before ties were stored do not change
         return None
     return np.where(groups != 0, np.clip(np.nan_to_num(ties), 0.0, 1.0), 0.0).astype(np.float32)
@@ -54,9 +54,9 @@ def read(datablock):
     groups = groups_of(datablock)
     if groups is None:
         return None
-    held = attributes.read(datablock, HELD, "FLOAT", "CURVE")
+    held = attributes.read(datablock, HELD, *_FLOAT_PER_GUIDE)
     held = np.zeros(len(groups), np.float32) if held is None else np.clip(np.nan_to_num(held), 0.0, 1.0)
-    length = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
+    length = attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE)
     if length is not None:
         held = np.where(held < 1.0, np.clip(np.nan_to_num(length) / _lengths(datablock), 0.0, 1.0), held)
     ties = ties_of(datablock)
@@ -76,9 +76,9 @@ def write(datablock, gathered):
             datablock.attributes.remove(present)
     if is_any:
         attributes.write(datablock, NAME, "INT", "CURVE", gathered.groups.astype(np.int32))
-        attributes.write(datablock, HELD, "FLOAT", "CURVE", gathered.held.astype(np.float32))
-        attributes.write(datablock, TIE, "FLOAT", "CURVE", gathered.ties.astype(np.float32))
-        attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", gathered.held * _lengths(datablock))
+        attributes.write(datablock, HELD, *_FLOAT_PER_GUIDE, gathered.held.astype(np.float32))
+        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, gathered.ties.astype(np.float32))
+        attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, gathered.held * _lengths(datablock))
 
 
 def scale(datablock, change):
@@ -86,7 +86,7 @@ def scale(datablock, change):
 
     Each segment is scaled as in its direction, and lengths beyond the tip as widths.
     """
-    lengths = attributes.read(datablock, _LENGTH, "FLOAT", "CURVE")
+    lengths = attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE)
     if lengths is None or not len(lengths):
         return
     scaled = change.widths(lengths)
@@ -99,7 +99,7 @@ def scale(datablock, change):
         parts = np.clip(left / np.maximum(before, 1e-30), 0.0, 1.0)
         beyond = np.maximum(lengths - np.add.reduceat(before, starts[:-1]), 0.0)
         scaled = np.add.reduceat(parts * now, starts[:-1]) + change.widths(beyond)
-    attributes.write(datablock, _LENGTH, "FLOAT", "CURVE", scaled)
+    attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, scaled)
 
 
 def follow_lengths(datablock, before, cuts):
@@ -108,7 +108,11 @@ def follow_lengths(datablock, before, cuts):
     before: (N, 3), their local points before the change; cuts: whether shorter guides are cut instead of scaled. Points
     keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
     """
-    groups, ties, lengths = groups_of(datablock), ties_of(datablock), attributes.read(datablock, _LENGTH, *_PER_GUIDE)
+    groups, ties, lengths = (
+        groups_of(datablock),
+        ties_of(datablock),
+        attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE),
+    )
     if groups is None:
         return
     former, present = (_along(_even(datablock, points)) for points in (before, curves.read_points(datablock)))
@@ -117,10 +121,10 @@ def follow_lengths(datablock, before, cuts):
     if ties is not None:
         for guide in np.flatnonzero((ties > 0.0) & is_cut):
             ties[guide] = _part_at(present[guide], _length_at(former[guide], ties[guide]))
-        attributes.write(datablock, TIE, *_PER_GUIDE, ties)
+        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, ties)
     if lengths is not None:
         scales = np.where(is_cut | (whole <= 0.0), 1.0, present[:, -1] / np.maximum(whole, 1e-30))
-        attributes.write(datablock, _LENGTH, *_PER_GUIDE, lengths * scales)
+        attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, lengths * scales)
 
 
 def of_even_points(datablock, ties):

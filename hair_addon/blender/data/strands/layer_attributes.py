@@ -35,21 +35,18 @@ def read(datablock, identities, weights):
     return _on_base(datablock, turns, stretches, weights, attributes.read)
 
 
-def opened(datablock, identities, weights, active):
+def opened(datablock, identities, weights):
     """Return `GuideLayers` like `read`, with base, turns and stretches in Blender's memory.
 
-    Copies would take most of the time of recording. The arrays are valid until the next evaluation. active: index of
-    the layer that will be recorded, whose attributes are created if they are missing.
+    Copies would take most of the time of recording. The arrays are valid until the next evaluation.
     """
     point_count, layers = len(datablock.points), []
-    for place, identity in enumerate(identities):
+    for identity in identities:
         values = []
         for name, data_type, shape in (
             (_turn(identity), "QUATERNION", (point_count, 4)),
             (_stretch(identity), "FLOAT", (point_count,)),
         ):
-            if place == active and not attributes.has(datablock, name, data_type, "POINT"):
-                attributes.write(datablock, name, data_type, "POINT", np.zeros(shape, np.float32))
             found = attributes.view(datablock, name, data_type, "POINT")
             values.append(np.zeros(shape, np.float32) if found is None else found)
         layers.append(values)
