@@ -98,9 +98,24 @@ def test_a_job_is_given_up_after_its_time(job, monkeypatch):
 
 
 def test_an_idle_process_ends(tmp_path, monkeypatch):
-    """Without jobs the process returns from its work; at the end of its input it exits at once."""
-    exited = threading.Event()
-    monkeypatch.setattr(os, "_exit", lambda _status: exited.set())
+    """Without jobs the process returns from its work; at the end of its input it exits at once.
+
+    Files that jobs or Blender write until then are removed with their folder.
+    """
+    exited, started, start = threading.Event(), [], subprocess.Popen
+
+    def start_process(*arguments, **options):
+        started.append(start(*arguments, **options))
+        return started[-1]
+
+    def write_and_exit(_status):
+        (tmp_path / "blender_late").mkdir(parents=True, exist_ok=True)
+        for each in started:
+            each.communicate()  # closes its input, as the end of a process does
+        exited.set()
+
+    monkeypatch.setattr(subprocess, "Popen", start_process)
+    monkeypatch.setattr(os, "_exit", write_and_exit)
     monkeypatch.setattr(background_process, "IDLE", 0.01)
     read, write = os.pipe()
     background_jobs.serve(read, tmp_path)
@@ -143,9 +158,17 @@ def test_the_process_ends_with_its_parent(tmp_path):
     parent.wait()
     while _runs(other) and time.monotonic() < end:
         time.sleep(0.05)
-    assert not _runs(other) and not folder.exists()
-    assert [each.name for each in temporary.iterdir() if not each.name.startswith("blender_")] == []
+    assert not _runs(other) and _is_removed(folder)
+    assert all(_is_removed(each) for each in temporary.iterdir() if not each.name.startswith("blender_"))
     assert len(list(temporary.iterdir())) <= 1  # of the parent, which was killed
+
+
+def _is_removed(folder):
+    """Whether a folder is gone, at the latest after some seconds."""
+    end = time.monotonic() + 20.0
+    while folder.exists() and time.monotonic() < end:
+        time.sleep(0.02)
+    return not folder.exists()
 
 
 def _runs(pid):

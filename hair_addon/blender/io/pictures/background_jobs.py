@@ -5,7 +5,8 @@ import contextlib
 import json
 import os
 import queue
-import shutil
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -14,12 +15,18 @@ from ...data.pictures.picture_jobs import BLEND
 from ...host import background_process
 from . import light_panorama, surface_bake, world_panorama
 
+_REMOVE = """
+import json, shutil, sys
+for folder in json.load(sys.stdin):
+    shutil.rmtree(folder, ignore_errors=True)
+"""
+
 
 def serve(stream, temporary):
     """Run jobs until none has arrived for some minutes.
 
     stream: a file descriptor with the path of a job's folder in each line, as JSON; temporary: the folder of temporary
-    files. At the end of the stream the process ends at once, even during a job, and removes these folders.
+    files. At the end of the stream the process ends at once, even during a job, and these folders are removed.
     """
     folders = queue.Queue()
     threading.Thread(target=_read, args=(stream, folders, temporary), daemon=True).start()
@@ -36,8 +43,21 @@ def _read(stream, folders, temporary):
         for line in lines:
             seen.append(json.loads(line))
             folders.put(seen[-1])
-    for folder in (*seen, temporary):
-        shutil.rmtree(folder, ignore_errors=True)
+    _end([*seen, temporary])
+
+
+def _end(folders):
+    """End this process and let another remove folders after that: until then jobs and Blender write into them."""
+    with contextlib.suppress(OSError):  # no process can start: the folders are left
+        remover = subprocess.Popen(
+            [sys.executable, "-I", "-c", _REMOVE],
+            stdin=subprocess.PIPE,  # closed by the end of this process
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        remover.stdin.write(json.dumps([str(each) for each in folders if os.path.exists(each)]).encode())
+        remover.stdin.flush()
     os._exit(0)
 
 
