@@ -6,37 +6,22 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.errors import HairError
 from ...core.long_work import no_progress, part_of
 from ..data.pictures import drawn_meshes, viewport_shading
 from ..data.pictures.mist import WITHOUT_WORLD, Mist, read_mist
 from ..gpu import (
     ambient_visibility,
     drawing,
-    level_of_detail,
     scene_lights,
     strand_batches,
-    strand_textures,
     studio_lights,
-    surface_shading,
     surface_textures,
     windows,
 )
 from ..gpu import lights as blender_lights
 from ..gpu.programs import surface_programs, uniforms
 from ..gpu.shadows import ShadowMaps
-from ..host import running
-from ..host.notices import can_be_drawn
-from . import (
-    gpu_strands,
-    hair_cache,
-    hair_places,
-    light_paths,
-    modified_hair,
-    motion_vectors,
-    read_strands,
-    solid_hair,
-)
+from . import drawn_hair, drawn_surfaces, gpu_strands, hair_places, motion_vectors
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
@@ -62,7 +47,7 @@ class DrawnScene:
     instances: tuple = ()  # of hair, from `hair_places.read_instances`
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
     clear: tuple = ()  # visible clear surfaces, like `surfaces`
-    blockers: tuple = ()  # `Blocker`s: surfaces that block light, visible or not
+    blockers: tuple = ()  # `drawn_surfaces.Blocker`s: surfaces that block light, visible or not
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
@@ -134,26 +119,6 @@ class DrawnScene:
         return motion_vectors.places_of(self)
 
 
-@dataclass(frozen=True, eq=False)
-class Blocker:
-    """A surface that blocks light. owner: as in `scene_lights.Receiver`; source: its `DrawnMesh`, where light paths
-    may be traced; is_seen: visible to cameras.
-    """
-
-    surface: surface_textures.SurfaceOnGPU
-    owner: tuple
-    source: drawn_meshes.DrawnMesh | None = None
-    is_seen: bool = True
-
-    @cached_property
-    def mesh(self):
-        """(corner positions, their normals, `triangle_materials`); normals are zero if they were not read."""
-        source = self.source
-        positions = source.positions
-        normals = np.zeros_like(positions) if source.normals is None else source.corner_normals
-        return positions, normals, source.triangle_materials
-
-
 _EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), blender_lights.World(np.zeros(3)), None, [], [])
 
 
@@ -180,19 +145,21 @@ def read(
     # If only the geometry of hair has changed, instances are unchanged.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
     seen = hair_places.hair_places(view_layer, viewport, instances)
-    hair, places = _read_hair(seen, viewport, refused, shown, depsgraph)
+    hair, places = drawn_hair.read_shown(seen, viewport, refused, shown, depsgraph)
     if viewport is not None and is_hair_only and not hair:
         # Scenes without hair cost nothing.
         return _EMPTY
     is_shaded, grown_on = viewport is None or not is_hair_only, _surface_uids(places)
-    has_normals = is_shaded or _needing_normals(blender_scene, viewport, shown, grown_on, former is not None)
-    if before is None or before.shadow_maps is None or (has_normals is True and _lacks_normals(before)):
-        surroundings = _read_surroundings(
+    has_normals = is_shaded or drawn_surfaces.needing_normals(
+        blender_scene, viewport, shown, grown_on, former is not None
+    )
+    if before is None or before.shadow_maps is None or (has_normals is True and drawn_surfaces.lack_normals(before)):
+        surroundings = drawn_surfaces.read_shown(
             depsgraph, viewport, shown, is_shaded, grown_on, former is not None, has_normals
         )
         world, lamps, maps = _world_of(shown.light, blender_scene, view_layer, viewport is None), None, None
     else:
-        surroundings = {name: getattr(before, name) for name in _SURROUNDINGS}
+        surroundings = {name: getattr(before, name) for name in drawn_surfaces.FIELDS}
         world, lamps, maps = before.world, before.lamps, before.shadow_maps
         if before.light != shown.light:
             world, lamps = _world_of(shown.light, blender_scene, view_layer), None
@@ -225,39 +192,6 @@ def read(
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
-
-
-def _read_surroundings(depsgraph, viewport, shown, is_shaded, grown_on, is_played, has_normals):
-    """Return `_SURROUNDINGS` of a scene: its meshes on the GPU.
-
-    is_shaded: whether Vellus shades surfaces; grown_on: from `_surface_uids`; is_played: during playback; has_normals:
-    as in `drawn_meshes.read_drawn_meshes`; other parameters: as in `read`.
-    """
-    meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_played, has_normals)
-    if is_shaded:
-        meshes = drawn_meshes.split_clear(meshes)
-    is_lit_by_scene = shown.light.kind == viewport_shading.SCENE
-    surroundings = _upload(meshes, is_shaded, has_paths=viewport is None or is_lit_by_scene)
-    if not is_lit_by_scene:
-        below = tuple(blocker for blocker in surroundings["blockers"] if blocker.owner[1] in grown_on)
-        surroundings["blockers"] = below  # in Solid shading other surfaces cast no shadows
-    return surroundings
-
-
-def _needing_normals(blender_scene, viewport, shown, grown_on, is_moving):
-    """Whether surfaces that Blender draws in a viewport need normals, or {session_uid} of those that do.
-
-    Shadows of hair on surfaces need normals, and at rest light paths do. Blender computes normals for each pose.
-    """
-    if viewport.shading.type != "MATERIAL":
-        return False if shown.is_wire else grown_on
-    has_paths = light_paths.path_count(blender_scene, (1, 1)) > 0 and not is_moving
-    return has_paths or blender_scene.vellus.has_preview_shadow
-
-
-def _lacks_normals(drawn):
-    """Whether surfaces of a `DrawnScene` were read without normals, because they moved."""
-    return any(blocker.source is not None and blocker.source.normals is None for blocker in drawn.blockers)
 
 
 def _surface_uids(places):
@@ -394,10 +328,10 @@ def read_render(depsgraph, known, refused, noted, progress=no_progress):
 
 def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
     """`read_render` without lighting, for motion vectors."""
-    count = sum(_is_hair(instance.object) for instance in depsgraph.object_instances)
+    count = sum(drawn_hair.is_hair(instance.object) for instance in depsgraph.object_instances)
     progress("Reading hair", 0.0)
     found = []
-    for one in _read_rendered_hair(depsgraph, known, refused, noted):
+    for one in drawn_hair.read_rendered(depsgraph, known, refused, noted):
         found.append(one)
         progress("Reading hair", 0.6 * len(found) / count)
     progress("Reading surfaces", 0.6)
@@ -407,62 +341,7 @@ def read_unlit(depsgraph, known, refused, noted, progress=no_progress):
         meshes = drawn_meshes.as_holdouts(meshes)
     hair, owners, root_uvs = zip(*found, strict=True) if found else ((), (), ())
     lists = {"hair": list(hair), "owners": owners, "root_uvs": root_uvs}
-    return replace(_EMPTY, **lists, **_upload(meshes, is_shaded=True, has_paths=True))
-
-
-_SURROUNDINGS = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
-
-
-def _upload(meshes, is_shaded, has_paths):
-    """Return {name of `_SURROUNDINGS`: value} of `DrawnMesh`es.
-
-    is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
-    """
-    uploaded, blockers, twins = {False: [], True: []}, [], {}
-    surface_textures.surface_cache.make_room(len(meshes))
-    surface_shading.baked_cache.make_room(
-        2 * sum(material.is_baked for mesh in meshes for _n, material in mesh.materials)
-    )
-    for mesh in meshes:
-        is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh, twins)
-        if mesh.is_seen:
-            places = scene_lights.places_on_surface(mesh.vertices, mesh.triangles, mesh.to_world)
-            receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
-            uploaded[is_clear].append(((surface, mesh.parts), receiver, mesh.owner))
-        if mesh.casts_shadow and not is_clear:
-            blockers.append(Blocker(surface, mesh.owner[1::-1], mesh if has_paths else None, mesh.is_seen))
-    solid, clear = uploaded.values()
-    return {
-        "surfaces": [surface for surface, _receiver, _owner in solid],
-        "clear": tuple(surface for surface, _receiver, _owner in clear),
-        "receivers": tuple(receiver for _surface, receiver, _owner in (*solid, *clear)),
-        "surface_owners": tuple(owner for _surface, _receiver, owner in solid),
-        "blockers": tuple(blockers),
-    }
-
-
-def _on_gpu(mesh, twins):
-    """Return the `SurfaceOnGPU` of a `DrawnMesh`; unchanged data of the object's last `SurfaceOnGPU` is reused.
-
-    twins: {shape: `SurfaceOnGPU`} of this scene, updated here: linked objects share its data.
-    """
-    key, cache = (mesh.owner[0], mesh.is_clear), surface_textures.surface_cache
-    shape, known = (len(mesh.vertices), len(mesh.triangles)), cache.get(key)
-    twin = twins.get(shape)
-    if twin is not None and (known is None or known.places is not twin.places):
-        known = twin if np.array_equal(mesh.vertices, twin.vertices) else known
-    surface = surface_textures.upload_surface(
-        mesh.vertices,
-        mesh.triangles,
-        mesh.normals,
-        mesh.has_vertex_normals,
-        mesh.uvs,
-        mesh.colors,
-        mesh.to_world,
-        known,
-    )
-    twins.setdefault(shape, surface)
-    return cache.keep(key, surface)
+    return replace(_EMPTY, **lists, **drawn_surfaces.upload(meshes, is_shaded=True, has_paths=True))
 
 
 def _placed(hair):
@@ -504,86 +383,6 @@ def _renewed(renewal, seen, drawn):
     """`visibility` by one step of a `Renewal`; seen: the visibility before."""
     through = [(shading.opacity, shading.forward) for _, shading, *_ in drawn.hair]
     return renewal.step(seen, _placed(drawn.hair), _blocking(drawn), through, _receiving(drawn))
-
-
-def _is_hair(evaluated):
-    """Whether an evaluated object shows hair."""
-    if evaluated.type != "CURVES" or evaluated.original.data.vellus.kind != "HAIR":
-        return False
-    return len(evaluated.data.curves) > 0
-
-
-def _read_rendered_hair(depsgraph, known, refused, noted):
-    """Yield (hair, owner, texture of UVs or None) as in a `DrawnScene`."""
-    has_uvs = depsgraph.view_layer.use_pass_uv
-    for instance in depsgraph.object_instances:
-        hair_object = instance.object
-        if not _is_hair(hair_object):
-            continue
-        original = hair_object.original.data
-        to_world = np.array(instance.matrix_world, np.float64)
-        if not can_be_drawn(hair_object, to_world):
-            continue
-        try:
-            read = read_strands.read(hair_object.data)
-            if read.note is not None:
-                noted(original, read.note)
-            uid = hair_object.original.session_uid
-            if uid not in known or not read_strands.are_same(read.arrays, known[uid][:-1]):
-                known[uid] = (*read.arrays, strand_textures.upload_strands(*read.arrays))
-            strands = known[uid][-1]
-            shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # settings may be keyed
-        except HairError as error:
-            refused(original, error)
-            continue
-        uvs = read_strands.read_root_uvs(hair_object.data, read.is_sound) if has_uvs else None
-        texture = None if uvs is None else strand_textures.pairs_texture(uvs, strands.row_strands)
-        yield (strands, shading, to_world, level_of_detail.NO_LIMITS), drawn_meshes.owner_of(instance), texture
-
-
-def _read_hair(places, viewport, refused, shown, depsgraph):
-    """Return (hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
-    hair, drawn_places = [], []
-    solid_hair.make_room(len(places))
-    for place in places:
-        datablock = place.hair_object.data
-        if viewport is not None and not datablock.vellus.is_drawn:
-            continue
-        if not can_be_drawn(place.hair_object, place.to_world):
-            continue
-        try:
-            strands, shading = _drawn_hair(place.hair_object, depsgraph, viewport is not None, shown)
-        except HairError as error:
-            if refused is None:
-                raise
-            refused(datablock, error)
-            continue
-        if strands is not None:
-            state = datablock.vellus
-            limits = level_of_detail.Limits(0.01 * state.viewport_percentage, state.is_reduced_in_viewport)
-            hair.append((strands, shading, place.to_world, limits))
-            drawn_places.append(place)
-    return hair, drawn_places
-
-
-def _drawn_hair(hair_object, depsgraph, is_viewport, shown):
-    """Return (`StrandsOnGPU`, shading) of an object, as Blender evaluates it if an artist has added modifiers."""
-    is_modified, datablock = modified_hair.is_modified(hair_object), hair_object.data
-    if is_modified:
-        strands = modified_hair.strands_on_gpu(hair_object, depsgraph)
-    else:
-        modified_hair.forget(hair_object)
-        strands = hair_cache.drawn_strands(datablock, is_viewport)
-    if strands is None:
-        return None, None
-    tints = None
-    if solid_hair.has_root_colors(shown):
-        places = modified_hair.places(hair_object, depsgraph) if is_modified else hair_cache.places_of(datablock)
-        tints = solid_hair.strand_tints(shown, hair_object, depsgraph, strands, places)
-    is_neutral = tints is not None or solid_hair.is_tinted(shown)
-    waits = not (is_viewport and running.has_window())
-    shading = hair_cache.shading_of(datablock, strands, is_neutral, waits)
-    return strands, solid_hair.shown_as(shading, shown, hair_object, tints)
 
 
 def _have_same_places(drawn, other):

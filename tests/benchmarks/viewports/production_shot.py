@@ -30,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 import hair_addon
 from blend_samples.heads import brows, head
 from hair_addon.blender.data import scene
+from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu.display_transform import DisplayTransform
 from hair_addon.blender.gpu.shadows import ShadowMaps
 from hair_addon.blender.gpu.strands.strand_bounds import StrandBounds
@@ -39,7 +40,14 @@ from hair_addon.blender.gpu.strands.style_maker import StyleMaker
 from hair_addon.blender.groom import hidden_hair
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import hidden_previews, live_hair
-from hair_addon.blender.render import drawn_scene, hair_cache, motion_vectors, scene_drawing
+from hair_addon.blender.render import (
+    drawn_hair,
+    drawn_scene,
+    drawn_surfaces,
+    hair_cache,
+    motion_vectors,
+    scene_drawing,
+)
 from hair_addon.blender.render.viewport import hair_picture, viewport
 from hair_addon.blender.render.viewport.history import History
 from hair_addon.blender.settings import preferences, style_items
@@ -60,9 +68,9 @@ STAGES = {
     "carry": (StrandCarrier, "carry"),
     "bounds": (StrandBounds, "_read"),
     "pose": (hair_cache, "_pose_of"),
-    "hair read": (drawn_scene, "_read_hair"),
-    "meshes": (drawn_scene.drawn_meshes, "read_drawn_meshes"),
-    "upload": (drawn_scene, "_upload"),
+    "hair read": (drawn_hair, "read_shown"),
+    "meshes": (drawn_meshes, "read_drawn_meshes"),
+    "upload": (drawn_surfaces, "upload"),
     "lamps": (drawn_scene, "_lamps_of"),
     "maps": (ShadowMaps, "draw"),
     "lit": (drawn_scene, "_lit"),

@@ -9,7 +9,7 @@ from mathutils import Euler, Matrix
 
 from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import surface_textures
-from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.blender.render import drawn_surfaces, offscreen
 from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
@@ -48,7 +48,7 @@ def surfaces():
     """Return [SurfaceOnGPU] of the scene as a render reads it."""
     bpy.context.view_layer.update()
     meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
-    shown = drawn_scene._upload(meshes, is_shaded=True, has_paths=False)
+    shown = drawn_surfaces.upload(meshes, is_shaded=True, has_paths=False)
     return [surface for surface, _parts in (*shown["surfaces"], *shown["clear"])]
 
 
