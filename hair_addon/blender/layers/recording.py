@@ -57,7 +57,7 @@ def update(guides: Curves, depsgraph: Depsgraph) -> bool:
     had_status = bool(state.status)
     state.status = ""
     shown, weights = None, _weights(guides, depsgraph, is_shown=True)
-    layers = layer_attributes.opened(guides, layer_items.identities_of(state), weights)
+    layers = layer_attributes.in_place(guides, layer_items.identities_of(state), weights)
     if is_combed and np.isfinite(points).all():
         shape = _shape(guides, layers)
         is_other = guide_layers.is_other(layers, points, shape)

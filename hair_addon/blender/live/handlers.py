@@ -55,7 +55,7 @@ def after_depsgraph_update(scene, depsgraph):
     global _is_opening, _is_undone
     copies = file_changes.follow([scene])
     is_seen = viewport.is_up_to_date()
-    events.scene_changed(updates.are_of_hair(reports), updates.are_of_light(reports))
+    events.scene_changed(updates.are_only_hair(reports), updates.are_only_lamps(reports))
     _follow_scene(reports, scene, depsgraph)
     if _is_opening:
         _is_opening = False
@@ -84,7 +84,7 @@ def after_depsgraph_update(scene, depsgraph):
             hidden_previews.hair_changed(hair, is_seen)
     animated.follow(depsgraph)
     simulated_hair.follow_settings(scene, depsgraph)
-    if updates.are_of_light(reports) and any(map(_is_outdated, bpy.data.hair_curves)):
+    if updates.are_only_lamps(reports) and any(map(_is_outdated, bpy.data.hair_curves)):
         events.scene_changed()  # styles may read lamps, and settings may be driven by them
     evaluation.evaluate(depsgraph, combed)
     simulated_hair.note_combed(combed, scene)
@@ -238,7 +238,7 @@ def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces; regenerate animated hair, in renders too."""
     reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
     if scene_time.is_shown(depsgraph):
-        events.scene_changed(is_hair_only=updates.are_of_hair_in_frame(reports))
+        events.scene_changed(is_hair_only=updates.are_only_hair_in_frame(reports))
         for report in reports:
             if report.is_geometry and updates.type_of_object(report) == "CURVES":
                 events.hair_evaluated(report.datablock)

@@ -79,13 +79,13 @@ def deformed(updates: list[Update]) -> set[bpy.types.Object]:
     return {one for one in changed if one.type == "MESH"}
 
 
-def are_of_hair(updates: list[Update]) -> bool:
+def are_only_hair(updates: list[Update]) -> bool:
     """Whether only the geometry of Curves has changed, and not surfaces, lights or the world."""
     # Blender reports no datablock for changes of visibility.
     return len(updates) > 0 and all(map(_are_curves, updates))
 
 
-def are_of_light(updates: list[Update]) -> bool:
+def are_only_lamps(updates: list[Update]) -> bool:
     """Whether only lamps and their places have changed."""
     # Blender reports an embedded node tree together with the lamp, material or world that owns it.
     owners = [update for update in updates if not _is_own_tree(update)]
@@ -94,7 +94,7 @@ def are_of_light(updates: list[Update]) -> bool:
     )
 
 
-def are_of_hair_in_frame(updates: list[Update]) -> bool:
+def are_only_hair_in_frame(updates: list[Update]) -> bool:
     """Whether a change of the frame changed only Curves: Blender reports all evaluated datablocks, but no images."""
     if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
         return False

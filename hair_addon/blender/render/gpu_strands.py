@@ -81,10 +81,10 @@ class StrandGenerator:
         """Whether the GPU can apply the styles of strands that it makes; decided only here."""
         return styles.styling is None or style_maker.can_style(styles.styling)
 
-    def rest(self) -> None:
+    def release_memory(self) -> None:
         """Release the memory that is needed only until changed strands are written."""
         if isinstance(self.maker, style_maker.StyleMaker):
-            self.maker.rest()
+            self.maker.release_memory()
 
     def bring(self, cached: Any, pose: Pose | None, is_behind: bool) -> bool:
         """Update the cached strands of `hair_cache` for combed guides and for a pose of their surface.

@@ -265,7 +265,7 @@ def invalidate_unless_same(datablock):
     if cached is None or not _is_same(datablock, cached, bound):
         strand_cache.invalidate(uid)
     else:
-        cached.generator.rest()
+        cached.generator.release_memory()
         follow_looks(datablock)
 
 

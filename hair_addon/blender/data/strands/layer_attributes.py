@@ -35,7 +35,7 @@ def read(datablock, identities, weights):
     return _on_base(datablock, turns, stretches, weights, attributes.read)
 
 
-def opened(datablock, identities, weights):
+def in_place(datablock, identities, weights):
     """Return `GuideLayers` like `read`, with base, turns and stretches in Blender's memory.
 
     Copies would take most of the time of recording. The arrays are valid until the next evaluation.

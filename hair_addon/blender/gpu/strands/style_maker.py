@@ -117,7 +117,7 @@ class StyleMaker:
         self._before = self.styling
         return self.changes.changed(strands) if rest is None else strands
 
-    def rest(self) -> None:
+    def release_memory(self) -> None:
         """Release the memory for strands between styles, as no slider moves."""
         if len(self.plain) > 1:
             self.plain, self._contained = self.plain[:1], None

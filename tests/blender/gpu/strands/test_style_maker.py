@@ -298,7 +298,7 @@ def test_styles_above_a_slider_are_not_applied_again(hair, slid):
     assert make(*frizzed[1])[-1] == (0,)
     assert make(*frizzed[2])[-1] == (last,)
     assert strand_textures.bytes_of(makers[-1].textures) > held
-    makers[-1].rest()
+    makers[-1].release_memory()
     assert strand_textures.bytes_of(makers[-1].textures) == held
     assert make(*frizzed[1]) == ["fill", (0,)]
 
