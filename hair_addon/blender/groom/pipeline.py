@@ -302,7 +302,7 @@ class _PlacementInputs(TypedDict):
     drawn_on: np.ndarray | None
     shape: TriMesh | None
     is_mirrored: bool
-    ties: np.ndarray | None
+    tie_fractions: np.ndarray | None
     device: str
 
 
@@ -320,7 +320,7 @@ def _placement_inputs(surface, shown, mask, parting, device) -> _PlacementInputs
         drawn_on=surface.drawn_on,
         shape=surface.shape,
         is_mirrored=surface.has_flipped_winding,
-        ties=parting.ties,
+        tie_fractions=parting.tie_fractions,
         device=device,
     )
 

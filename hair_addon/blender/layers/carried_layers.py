@@ -110,7 +110,7 @@ def binding_of(
         drawn_on=surface.drawn_on,
         roots=roots,
         is_mirrored=surface.has_flipped_winding,
-        ties=before.parting.ties if guides is None else None,
+        tie_fractions=before.parting.tie_fractions if guides is None else None,
     )
 
 

@@ -71,7 +71,7 @@ def _weighted_sum(binding, guides, weights, out=None, under_way=None):
         binding.keep_length,
         out,
         under_way,
-        guide_ties=binding.guide_ties,
+        tie_fractions=binding.tie_fractions,
     )
 
 
@@ -200,7 +200,7 @@ def _sums_of_some(parts, guides):
                 weights,
                 binding.keep_length,
                 chosen=chosen,
-                guide_ties=binding.guide_ties,
+                tie_fractions=binding.tie_fractions,
             )
         )
         of_all.append(weights.weights)

@@ -346,7 +346,7 @@ def bind_hair(
     shape: TriMesh | None = None,
     roots: SurfacePoints | None = None,
     is_mirrored: bool = False,
-    ties: np.ndarray | None = None,
+    tie_fractions: np.ndarray | None = None,
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> HairBinding:
@@ -357,8 +357,9 @@ def bind_hair(
     part lines near the surface, across which strands do not blend guides (consecutive segments that touch form a line),
     or None; drawn_on: (V, 3) vertices of the posed surface on which the part lines were drawn, None for the mesh's own;
     shape: as in `distribute_guides`; roots: existing `SurfacePoints` of strands, None to place them; is_mirrored:
-    whether the mesh's triangles are wound opposite to the triangles of the stored roots, which identify strands; ties:
-    (G,) in [0, 1], the fraction of each guide's points up to its tie, None without gathered guides. Raises `HairError`.
+    whether the mesh's triangles are wound opposite to the triangles of the stored roots, which identify strands;
+    tie_fractions: (G,) in [0, 1], the fraction of each guide's points up to its tie, None without gathered guides.
+    Raises `HairError`.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
@@ -377,7 +378,7 @@ def bind_hair(
 
     progress("Finding guides", 0.4)
     binder = interpolation.root_binder.RootBinder(
-        mesh, guides.roots, settings, regions, laid, is_mirrored, device, ties
+        mesh, guides.roots, settings, regions, laid, is_mirrored, device, tie_fractions
     )
     return binder.bind(roots)
 

@@ -64,7 +64,7 @@ def grown_between(
     lines: np.ndarray | None = None,
     drawn_on: np.ndarray | None = None,
     is_mirrored: bool = False,
-    ties: np.ndarray | None = None,
+    tie_fractions: np.ndarray | None = None,
     device: str = "cpu",
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return guides (M, P, 3) float32 [m] at roots (M,), interpolated like hair, and their nearest guides (M,).
@@ -80,7 +80,7 @@ def grown_between(
         drawn_on=drawn_on,
         roots=roots,
         is_mirrored=is_mirrored,
-        ties=ties,
+        tie_fractions=tie_fractions,
         device=device,
     )
     nearest = np.maximum(binding.guide_weights.indices.numpy()[:, 0], 0)

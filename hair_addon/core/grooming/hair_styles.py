@@ -39,12 +39,12 @@ def clump_trees(
     drawn_on: np.ndarray | None = None,
     shape: TriMesh | None = None,
     is_mirrored: bool = False,
-    ties: np.ndarray | None = None,
+    tie_fractions: np.ndarray | None = None,
     device: str = "cpu",
 ) -> ClumpTrees:
     """Return the `ClumpTrees` of hair, initially empty; arguments as in `groom.bind_hair`."""
     laid = groom.laid_lines(mesh, lines, drawn_on, device)
-    binder = RootBinder(mesh, guide_roots, settings, regions, laid, is_mirrored, device, ties)
+    binder = RootBinder(mesh, guide_roots, settings, regions, laid, is_mirrored, device, tie_fractions)
 
     placed_on, its_texture = mesh if shape is None else shape, texture
     if is_mirrored:  # like stored roots, so that sites are the same on a mirrored surface

@@ -39,7 +39,7 @@ class HairBinding:
     limits: "Limits"
     keep_length: float
     is_mirrored: bool = False  # whether the winding of triangles is opposite to that of the stored roots
-    guide_ties: "wp.array[float] | None" = None  # (G,) as in `interpolation.interpolate`
+    tie_fractions: "wp.array[float] | None" = None  # (G,) as in `interpolation.interpolate`
 
     @cached_property
     def identities(self) -> tuple[np.ndarray, np.ndarray]:
@@ -63,12 +63,12 @@ def weighed(
     candidates: "Candidates",
     settings: Any,
     is_mirrored: bool = False,
-    guide_ties: "wp.array[float] | None" = None,
+    tie_fractions: "wp.array[float] | None" = None,
 ) -> HairBinding:
     """Return the `HairBinding` of strands with `Candidates`.
 
     root_frames: positions (S,) [m] and unit normals (S,), vec3; guide_frames: positions (G, 3) float32 [m] and unit
-    normals (G,) vec3; settings: `HairSettings`; guide_ties: (G,) as in `interpolation.interpolate`.
+    normals (G,) vec3; settings: `HairSettings`; tie_fractions: (G,) as in `interpolation.interpolate`.
     """
     return HairBinding(
         roots,
@@ -85,7 +85,7 @@ def weighed(
         interpolation.guide_weights.Limits(settings.angle_limit, settings.length_limit),
         settings.keep_length,
         is_mirrored,
-        guide_ties,
+        tie_fractions,
     )
 
 
@@ -98,5 +98,5 @@ def relimited(binding: HairBinding, settings: Any) -> HairBinding:
 def reweighed(binding: HairBinding, settings: Any) -> HairBinding:
     """Return a `HairBinding` with other weights, limits or lengths, without a search; k must not grow."""
     at_roots, at_guides = (binding.positions, binding.normals), (binding.guide_positions, binding.guide_normals)
-    kept = binding.is_mirrored, binding.guide_ties
+    kept = binding.is_mirrored, binding.tie_fractions
     return weighed(binding.roots, at_roots, at_guides, binding.candidates, settings, *kept)

@@ -63,22 +63,23 @@ def interpolate(
     out: wp.array2d[wp.vec3] | None = None,
     under_way: Callable[[], None] | None = None,
     chosen: ChosenStrands | None = None,
-    guide_ties: wp.array[float] | None = None,
+    tie_fractions: wp.array[float] | None = None,
 ) -> wp.array2d[wp.vec3]:
     """Return (S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,), for guides (G, P) [m], normals (G,).
 
     keep_length: blend from Eq. 10 (0) to segments with the average length of the guides' segments (1); out: array to
     fill and return, None for a new one; under_way: on the CPU, as in `parallel.launch`; chosen: strands to compute, in
-    the order of the results and of the weights, which `limited` returns for the same strands, None for all; guide_ties:
-    (G,) in [0, 1], the fraction of each guide's points up to its tie, 0 for guides that are not gathered, None if no
-    guide is gathered. Raises `HairError` if counts do not match.
+    the order of the results and of the weights, which `limited` returns for the same strands, None for all;
+    tie_fractions: (G,) in [0, 1], the fraction of each guide's points up to its tie, 0 for guides that are not
+    gathered, None if no guide is gathered. Raises `HairError` if counts do not match.
     """
     row_count = len(roots) if chosen is None else len(chosen.strands)
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_points))
     require_count("guides", len(guide_points), guide_weights.guide_count)
-    ties = wp.zeros(len(guide_points), dtype=float, device=roots.device) if guide_ties is None else guide_ties
-    require_count("ties of guides", len(ties), len(guide_points))
+    if tie_fractions is None:
+        tie_fractions = wp.zeros(len(guide_points), dtype=float, device=roots.device)
+    require_count("ties of guides", len(tie_fractions), len(guide_points))
     require_count("guide weights", len(guide_weights.weights), row_count)
     for array in (guide_weights.indices, guide_weights.turns):
         require_count("guide weights", len(array), len(roots))
@@ -95,7 +96,7 @@ def interpolate(
     offsets = wp.empty((guide_count, group_count, 4 * SEGMENTS), dtype=float, device=roots.device)
     guide_rows = wp.empty((guide_count, 8), dtype=float, device=roots.device)
     guides = None if chosen is None else chosen.guides
-    chosen_rows.launch(_put_offsets, [guide_points, guide_normals, ties], [offsets, guide_rows], guides)
+    chosen_rows.launch(_put_offsets, [guide_points, guide_normals, tie_fractions], [offsets, guide_rows], guides)
     threads = 1 if on_cpu else SEGMENTS
     points = parallel.empty_vectors((row_count, point_count), roots.device) if out is None else out
     strands, of_strand = chosen_rows.arguments(None if chosen is None else chosen.strands, roots.device)
@@ -200,7 +201,7 @@ def _put_offsets(
     chosen: wp.array[int],
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
-    guide_ties: wp.array[float],
+    tie_fractions: wp.array[float],
     # outputs
     out_offsets: wp.array3d[float],
     out_rows: wp.array2d[float],
@@ -212,5 +213,5 @@ def _put_offsets(
         out_rows[guide, axis] = guide_normals[guide][axis]
         out_rows[guide, 3 + axis] = guide_points[guide, 0][axis]
     out_rows[guide, 6] = length
-    points_up_to_tie = guide_ties[guide] * float(guide_points.shape[1] - 1)
+    points_up_to_tie = tie_fractions[guide] * float(guide_points.shape[1] - 1)
     out_rows[guide, 7] = wp.where(points_up_to_tie > 0.0, 1.0 / points_up_to_tie, 0.0)

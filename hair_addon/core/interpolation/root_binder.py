@@ -26,7 +26,7 @@ class RootBinder:
 
     mesh: `TriMesh` [m]; settings: `HairSettings`; regions: strands blend only guides of one region; lines: `PartLines`
     that strands do not blend guides across, or None; is_mirrored: whether the winding of triangles is opposite to that
-    of the stored roots; ties: (G,) as in `interpolation.interpolate`.
+    of the stored roots; tie_fractions: (G,) as in `interpolation.interpolate`.
     """
 
     mesh: TriMesh
@@ -36,7 +36,7 @@ class RootBinder:
     lines: "PartLines | None" = None
     is_mirrored: bool = False
     device: str = "cpu"
-    ties: np.ndarray | None = None
+    tie_fractions: np.ndarray | None = None
 
     def bind(self, roots: SurfacePoints) -> HairBinding:
         """Return the `HairBinding` of strands at roots."""
@@ -97,8 +97,10 @@ class RootBinder:
     def _weighed(self, roots, at_roots, at_guides, candidates):
         import warp as wp
 
-        ties = None if self.ties is None else wp.array(np.float32(self.ties), dtype=float, device=self.device)
-        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored, ties)
+        tie_fractions = self.tie_fractions
+        if tie_fractions is not None:
+            tie_fractions = wp.array(np.float32(tie_fractions), dtype=float, device=self.device)
+        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored, tie_fractions)
 
     @cached_property
     def _guide_frames(self):

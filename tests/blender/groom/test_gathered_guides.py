@@ -105,17 +105,19 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
     gather(guides, shape="BRAID")
     lengths = []
     for _time in range(2):
-        ties, along = gathered_groups.ties_of(guides.data), segments(points(guides)).cumsum(axis=1)
+        tie_fractions, along = gathered_groups.tie_fractions_of(guides.data), segments(points(guides)).cumsum(axis=1)
         along = np.pad(along, ((0, 0), (1, 0)))
         numbers = np.arange(along.shape[1])
-        lengths.append([np.interp(tie * numbers[-1], numbers, own) for tie, own in zip(ties, along, strict=True)])
+        lengths.append(
+            [np.interp(tie * numbers[-1], numbers, own) for tie, own in zip(tie_fractions, along, strict=True)]
+        )
         api.change_guides(guides, "LENGTH", method="SET", length=4.0, shorten="CUT")
     assert np.max(lengths[0]) < 4.0
     np.testing.assert_allclose(lengths[1], lengths[0], rtol=0.02)
-    held, ties = gathered_groups.read(guides.data).held, gathered_groups.ties_of(guides.data)
+    held, tie_fractions = gathered_groups.read(guides.data).held, gathered_groups.tie_fractions_of(guides.data)
     api.change_guides(guides, "LENGTH", method="SCALE", factor=1.5)  # scaled guides keep their fractions
     np.testing.assert_allclose(gathered_groups.read(guides.data).held, held, rtol=1e-5)
-    np.testing.assert_array_equal(gathered_groups.ties_of(guides.data), ties)
+    np.testing.assert_array_equal(gathered_groups.tie_fractions_of(guides.data), tie_fractions)
 
 
 def test_ties_of_guides_with_fewer_points_than_strands(guides):
@@ -127,8 +129,8 @@ def test_ties_of_guides_with_fewer_points_than_strands(guides):
     guides.data.attributes["position"].data.foreach_set("vector", some.ravel())
     guides.data.update_tag()
     gather(guides, shape="BUN")
-    even, ties = curves.even_local_points(guides.data), gathered_groups.ties_of(guides.data)
-    at_tie = even[np.arange(len(even)), np.rint(40.0 * ties).astype(int)]
+    even, tie_fractions = curves.even_local_points(guides.data), gathered_groups.tie_fractions_of(guides.data)
+    at_tie = even[np.arange(len(even)), np.rint(40.0 * tie_fractions).astype(int)]
     assert even.shape[1] == 41 and np.linalg.norm(at_tie - LINE[0], axis=1).max() < 0.3
 
 

@@ -92,7 +92,7 @@ def test_regions_ties_and_selections_of_guides_come_along(groom, sphere, tmp_pat
     file = api.save_groom(hair, tmp_path, name="Parted", catalog="", picture=PICTURE)
     its_guides, its_hair = api.apply_groom(sphere, file)
     its = gathered_groups.read(its_guides)
-    for name in ("groups", "held", "ties"):
+    for name in ("groups", "held", "tie_fractions"):
         np.testing.assert_allclose(getattr(its, name), getattr(gathered, name), atol=1e-5)
     assert attributes.has(its_guides, "gathered_length", "FLOAT", "CURVE")
     np.testing.assert_array_equal(selection_sets.read_guides(its_guides, "Left"), parts > 0)

@@ -246,18 +246,18 @@ def test_strands_of_gathered_guides_reach_the_mean_of_their_guides_at_the_tie(sc
     roots, normals, points, guide_normals = (vectors(array) for array in arrays)
     weights = find_guides(roots, normals, points[:, 0].contiguous(), guide_normals, None, 8)
     free = interpolation.interpolate(roots, normals, points, guide_normals, weights).numpy()
-    ties = np.random.default_rng(5).uniform(0.05, 1.0, len(guides)).astype(np.float32)
-    ties[::3] = 0.0
-    of_guides = wp.array(ties, dtype=float, device=DEVICE)
-    found = interpolation.interpolate(roots, normals, points, guide_normals, weights, guide_ties=of_guides).numpy()
+    tie_fractions = np.random.default_rng(5).uniform(0.05, 1.0, len(guides)).astype(np.float32)
+    tie_fractions[::3] = 0.0
+    of_guides = wp.array(tie_fractions, dtype=float, device=DEVICE)
+    found = interpolation.interpolate(roots, normals, points, guide_normals, weights, tie_fractions=of_guides).numpy()
     indices, shares = weights.indices.numpy(), weights.weights.numpy().astype(np.float64)
     shares[indices < 0] = 0.0
-    along = np.arange(point_count)[None] / np.maximum(ties[:, None] * (point_count - 1), 1e-9)
-    along = np.where(ties[:, None] > 0.0, np.minimum(along, 1.0), 0.0)
+    along = np.arange(point_count)[None] / np.maximum(tie_fractions[:, None] * (point_count - 1), 1e-9)
+    along = np.where(tie_fractions[:, None] > 0.0, np.minimum(along, 1.0), 0.0)
     part = np.einsum("sk,skp->sp", shares, (along * along * (3.0 - 2.0 * along))[indices])[..., None]
     means = np.einsum("sk,skpi->spi", shares, guides.astype(np.float64)[indices])
     np.testing.assert_allclose(found, free + part * (means - free), atol=2e-5 * np.abs(guides).max())
-    is_untied = (np.where(shares > 0.0, ties[indices], 0.0) == 0.0).all(axis=1)
+    is_untied = (np.where(shares > 0.0, tie_fractions[indices], 0.0) == 0.0).all(axis=1)
     np.testing.assert_array_equal(found[is_untied], free[is_untied])
 
 

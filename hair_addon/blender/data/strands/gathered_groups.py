@@ -23,16 +23,16 @@ _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 @dataclass(frozen=True)
 class Gathered:
     """groups: (G,) int32, 0 for guides that are not gathered; held: (G,) float32, the fraction of the present length up
-    to the tie, or to the end of a row or bun; ties: (G,) float32, the fraction of the points up to the tie, after
-    guides with other numbers of points than strands are resampled at equal spacing.
+    to the tie, or to the end of a row or bun; tie_fractions: (G,) float32, the fraction of the points up to the tie,
+    after guides with other numbers of points than strands are resampled at equal spacing.
     """
 
     groups: np.ndarray
     held: np.ndarray
-    ties: np.ndarray
+    tie_fractions: np.ndarray
 
     def __getitem__(self, chosen):
-        return Gathered(self.groups[chosen], self.held[chosen], self.ties[chosen])
+        return Gathered(self.groups[chosen], self.held[chosen], self.tie_fractions[chosen])
 
 
 def groups_of(datablock):
@@ -41,12 +41,12 @@ def groups_of(datablock):
     return None if groups is None or not groups.any() else groups
 
 
-def ties_of(datablock):
-    """Return the ties (G,) float32 of guides as in `Gathered`; None if no guide is gathered."""
-    groups, ties = groups_of(datablock), attributes.read(datablock, TIE, *_FLOAT_PER_GUIDE)
-    if groups is None or ties is None:  # strands of files from before ties were stored do not change
+def tie_fractions_of(datablock):
+    """Return the `Gathered.tie_fractions` of guides; None if no guide is gathered."""
+    groups, tie_fractions = groups_of(datablock), attributes.read(datablock, TIE, *_FLOAT_PER_GUIDE)
+    if groups is None or tie_fractions is None:  # strands of files from before ties were stored do not change
         return None
-    return np.where(groups != 0, np.clip(np.nan_to_num(ties), 0.0, 1.0), 0.0).astype(np.float32)
+    return np.where(groups != 0, np.clip(np.nan_to_num(tie_fractions), 0.0, 1.0), 0.0).astype(np.float32)
 
 
 def read(datablock):
@@ -59,9 +59,9 @@ def read(datablock):
     length = attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE)
     if length is not None:
         held = np.where(held < 1.0, np.clip(np.nan_to_num(length) / _lengths(datablock), 0.0, 1.0), held)
-    ties = ties_of(datablock)
-    ties = np.zeros(len(groups), np.float32) if ties is None else ties
-    return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32), ties)
+    tie_fractions = tie_fractions_of(datablock)
+    tie_fractions = np.zeros(len(groups), np.float32) if tie_fractions is None else tie_fractions
+    return Gathered(groups, np.where(groups != 0, held, 0.0).astype(np.float32), tie_fractions)
 
 
 def write(datablock, gathered):
@@ -77,7 +77,7 @@ def write(datablock, gathered):
     if is_any:
         attributes.write(datablock, NAME, "INT", "CURVE", gathered.groups.astype(np.int32))
         attributes.write(datablock, HELD, *_FLOAT_PER_GUIDE, gathered.held.astype(np.float32))
-        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, gathered.ties.astype(np.float32))
+        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, gathered.tie_fractions.astype(np.float32))
         attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, gathered.held * _lengths(datablock))
 
 
@@ -108,9 +108,9 @@ def follow_lengths(datablock, before, cuts):
     before: (N, 3), their local points before the change; cuts: whether shorter guides are cut instead of scaled. Points
     keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
     """
-    groups, ties, lengths = (
+    groups, tie_fractions, lengths = (
         groups_of(datablock),
-        ties_of(datablock),
+        tie_fractions_of(datablock),
         attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE),
     )
     if groups is None:
@@ -118,19 +118,19 @@ def follow_lengths(datablock, before, cuts):
     former, present = (_along(_even(datablock, points)) for points in (before, curves.read_points(datablock)))
     whole = former[:, -1]
     is_cut = (present[:, -1] < whole) if cuts else np.zeros(len(groups), bool)
-    if ties is not None:
-        for guide in np.flatnonzero((ties > 0.0) & is_cut):
-            ties[guide] = _part_at(present[guide], _length_at(former[guide], ties[guide]))
-        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, ties)
+    if tie_fractions is not None:
+        for guide in np.flatnonzero((tie_fractions > 0.0) & is_cut):
+            tie_fractions[guide] = _part_at(present[guide], _length_at(former[guide], tie_fractions[guide]))
+        attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, tie_fractions)
     if lengths is not None:
         scales = np.where(is_cut | (whole <= 0.0), 1.0, present[:, -1] / np.maximum(whole, 1e-30))
         attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, lengths * scales)
 
 
-def of_even_points(datablock, ties):
-    """Return ties (G,) as fractions of the points that strands follow; ties: as fractions of the guides' own points."""
+def of_even_points(datablock, tie_fractions):
+    """Return tie fractions (G,) of the points that strands follow; tie_fractions: of the guides' own points."""
     points, starts = np.nan_to_num(curves.read_points(datablock)), curves.curve_offsets(datablock)
-    found = np.array(ties, np.float32)
+    found = np.array(tie_fractions, np.float32)
     if (np.diff(starts) == POINT_COUNT).all():
         return found
     along = _along(_even(datablock, points))
@@ -185,5 +185,6 @@ def add(datablock, gathered):
     is_new = gathered.groups > 0
     others = np.where(is_new, 0, present.groups)
     groups = np.where(is_new, gathered.groups + others.max(initial=0), others)
-    held, ties = np.where(is_new, gathered.held, present.held), np.where(is_new, gathered.ties, present.ties)
-    write(datablock, Gathered(groups, held, ties))
+    held = np.where(is_new, gathered.held, present.held)
+    tie_fractions = np.where(is_new, gathered.tie_fractions, present.tie_fractions)
+    write(datablock, Gathered(groups, held, tie_fractions))

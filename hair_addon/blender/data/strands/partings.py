@@ -20,24 +20,24 @@ _WHOLE = {"INT", "INT8", "BOOLEAN"}
 class Partings:
     """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] in a `Surface`'s coordinates, or None.
 
-    lines_key: `drawn_lines.key` of the lines; ties: (G,) float32 as in `gathered_groups.Gathered`, or None.
+    lines_key: `drawn_lines.key` of the lines; tie_fractions: (G,) float32 as in `gathered_groups.Gathered`, or None.
     """
 
     regions: tuple
     lines: np.ndarray | None
     lines_key: str
-    ties: np.ndarray | None
+    tie_fractions: np.ndarray | None
 
     @property
     def key(self):
         """A digest of regions, lines and ties; empty for none."""
-        if not self.regions and self.lines is None and self.ties is None:
+        if not self.regions and self.lines is None and self.tie_fractions is None:
             return ""
         digest = hashlib.blake2b(digest_size=16)
         for array in (part for r in self.regions for part in (r.corners, r.guides)):
             digest.update(b"-" if array is None else array.tobytes())
         digest.update(self.lines_key.encode() or b"-")
-        digest.update(b"" if self.ties is None else self.ties.tobytes())
+        digest.update(b"" if self.tie_fractions is None else self.tie_fractions.tobytes())
         return digest.hexdigest()
 
 
@@ -56,8 +56,10 @@ def read(surface_object, surface, guide_curves, settings, depsgraph):
         numbers = _read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph)
         regions += [] if numbers is None else [numbers]
     lines = drawn_lines.read(surface_object, surface, settings.part_lines, depsgraph)
-    ties = None if guide_curves is None else gathered_groups.ties_of(guide_curves)
-    return Partings(tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph), ties)
+    tie_fractions = None if guide_curves is None else gathered_groups.tie_fractions_of(guide_curves)
+    return Partings(
+        tuple(regions), lines, drawn_lines.key(surface_object, settings.part_lines, depsgraph), tie_fractions
+    )
 
 
 def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):

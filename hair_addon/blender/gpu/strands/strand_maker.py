@@ -116,7 +116,7 @@ class BoundStrands:
     roots: np.ndarray  # (S, 3) float32 [m]
     normals: np.ndarray  # (S, 3) float32, unit
     guide_normals: np.ndarray  # (G, 3) float32, unit
-    guide_ties: np.ndarray  # (G,) float32 as in `interpolation.interpolate`
+    tie_fractions: np.ndarray  # (G,) float32 as in `interpolation.interpolate`
     indices: np.ndarray  # (S, k) int32, -1 for none
     weights: np.ndarray  # (S, k) float32, before guides that differ too much are left out
     fading: tuple[float, float, float, float]  # `Limits.fading`
@@ -129,9 +129,9 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     arrays = (binding.positions, binding.normals, binding.guide_normals, weights.indices, weights.weights)
     roots, normals, guide_normals, indices, shares = (array.numpy() for array in arrays)
     none = np.zeros(len(guide_normals), np.float32)
-    ties = none if binding.guide_ties is None else binding.guide_ties.numpy()
+    tie_fractions = none if binding.tie_fractions is None else binding.tie_fractions.numpy()
     return BoundStrands(
-        roots, normals, guide_normals, ties, indices, shares, binding.limits.fading, binding.keep_length
+        roots, normals, guide_normals, tie_fractions, indices, shares, binding.limits.fading, binding.keep_length
     )
 
 
@@ -159,9 +159,9 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
     slot_count = bound.indices.shape[1]
     _segments_program(), _strands_program(slot_count, is_plain)
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
-    require_count("ties of guides", len(bound.guide_ties), guide_count)
+    require_count("ties of guides", len(bound.tie_fractions), guide_count)
     per_point = np.zeros(guide_count, np.float32)
-    np.divide(1.0, bound.guide_ties * max(point_count - 1, 1), out=per_point, where=bound.guide_ties > 0.0)
+    np.divide(1.0, bound.tie_fractions * max(point_count - 1, 1), out=per_point, where=bound.tie_fractions > 0.0)
     rows = np.concatenate([bound.guide_normals, per_point[:, None]], axis=1)
     normals_texture, record["row_normals"] = rows_texture(rows, 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 2)

@@ -94,10 +94,10 @@ def _part_images(datablock, gathered, sources):
     is_apart = (groups[sources] > 0) & (np.abs(shares[groups[sources]] - 0.5) > _ASIDE)
     images = np.zeros(len(datablock.curves), np.int32)
     images[len(images) - len(sources) :][is_apart] = groups[sources][is_apart]
-    held, ties = np.zeros(len(images), np.float32), np.zeros(len(images), np.float32)
+    held, tie_fractions = np.zeros(len(images), np.float32), np.zeros(len(images), np.float32)
     held[len(images) - len(sources) :] = gathered.held[sources]
-    ties[len(images) - len(sources) :] = gathered.ties[sources]
-    gathered_groups.add(datablock, gathered_groups.Gathered(images, held, ties))
+    tie_fractions[len(images) - len(sources) :] = gathered.tie_fractions[sources]
+    gathered_groups.add(datablock, gathered_groups.Gathered(images, held, tie_fractions))
 
 
 def write(
@@ -172,7 +172,7 @@ def _between(guides, roots, depsgraph):
         lines=parting.lines,
         drawn_on=surface.drawn_on,
         is_mirrored=surface.has_flipped_winding,
-        ties=parting.ties,
+        tie_fractions=parting.tie_fractions,
         device=device,
     )
     point_count = max(int(np.bincount(guides.counts).argmax()), 2)

@@ -100,7 +100,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     gathered = gathered_groups.read(guides)
     if gathered is not None:
         names = gathered_groups.NAME, gathered_groups.HELD, gathered_groups.TIE
-        regions.update(zip(names, (gathered.groups, gathered.held, gathered.ties), strict=True))
+        regions.update(zip(names, (gathered.groups, gathered.held, gathered.tie_fractions), strict=True))
     for selection in selection_names.names_of(guides):
         are_chosen = selection_sets.read_guides(guides, selection)
         if are_chosen is not None:

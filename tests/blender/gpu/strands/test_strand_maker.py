@@ -60,8 +60,8 @@ def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0,
     frames = (np.float32(guide_roots), guide_normals)
     binding = hair_binding.weighed(places, (vectors(roots), normals), frames, candidates, settings)
     if is_gathered:
-        ties = np.where(rng.random(GUIDES) < 0.5, rng.uniform(0.1, 1.0, GUIDES), 0.0)
-        binding = replace(binding, guide_ties=wp.array(np.float32(ties), dtype=float, device="cpu"))
+        tie_fractions = np.where(rng.random(GUIDES) < 0.5, rng.uniform(0.1, 1.0, GUIDES), 0.0)
+        binding = replace(binding, tie_fractions=wp.array(np.float32(tie_fractions), dtype=float, device="cpu"))
     return binding, strands.from_numpy(np.float32(points), guide_places, "cpu")
 
 
