@@ -7,7 +7,6 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.data.made import groom_assets
 from hair_addon.blender.data.strands import attributes, gathered_groups, selection_sets
 from hair_addon.blender.io import asset_catalogs, groom_library
 from hair_addon.core.errors import HairError
@@ -39,6 +38,16 @@ def groom(sphere):
 def library(groom, tmp_path):
     """Return the file of the saved groom."""
     return api.save_groom(groom[1], tmp_path / "library", name="Bob", catalog="Hair/Short", picture=PICTURE)
+
+
+def preview_of(datablock):
+    """Return (height, width, 4) float32 of a datablock's preview, or None."""
+    preview = datablock.preview
+    if preview is None or not all(preview.image_size):
+        return None
+    pixels = np.empty((preview.image_size[1], preview.image_size[0], 4), np.float32)
+    preview.image_pixels_float.foreach_get(pixels.ravel())
+    return pixels
 
 
 def datablocks():
@@ -129,7 +138,7 @@ def test_the_file_is_an_asset_with_a_picture_in_a_catalog(groom, library):
         wanted.objects = ["Bob"]
     asset = wanted.objects[0]
     assert asset.asset_data.catalog_id == asset_catalogs.read(library.parent, "Hair/Short").identifier
-    np.testing.assert_allclose(groom_assets.read_picture(asset), PICTURE, atol=0.003)
+    np.testing.assert_allclose(preview_of(asset), PICTURE, atol=0.003)
     lines = (library.parent / asset_catalogs.FILE).read_text().splitlines()
     assert sum("Hair/Short" in line for line in lines) == 1
 
@@ -218,7 +227,7 @@ def test_operators_save_with_a_picture_and_apply_and_undo(groom, sphere, tmp_pat
         bpy.context.preferences.filepaths.asset_libraries.remove(library)
     with bpy.data.libraries.load(str(tmp_path / "Bob.asset.blend"), assets_only=True) as (_there, wanted):
         wanted.objects = ["Bob"]
-    pixels = groom_assets.read_picture(wanted.objects[0])
+    pixels = preview_of(wanted.objects[0])
     assert pixels.shape == (256, 256, 4) and 0.1 < (pixels[..., 3] > 0.5).mean() < 0.9
 
 

@@ -47,17 +47,6 @@ def set_picture(datablock, pixels):
     preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
 
-def read_picture(datablock):
-    """Return (height, width, 4) float32 of a datablock's preview, or None."""
-    preview = datablock.preview
-    if preview is None or not all(preview.image_size):
-        return None
-    width, height = preview.image_size
-    pixels = np.empty((height, width, 4), np.float32)
-    preview.image_pixels_float.foreach_get(pixels.ravel())
-    return pixels
-
-
 def read_pixels(image):
     """Return (height, width, 4) float32 of an image with an alpha channel, bottom row first."""
     width, height = image.size

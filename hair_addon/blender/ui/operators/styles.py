@@ -23,9 +23,10 @@ def active_style_of(context):
     return None if hair is None else style_items.active_of(hair.vellus)
 
 
-def has_styles(operator, context):
-    """Whether the active hair has an active style; a `poll`, with its message."""
-    operator.poll_message_set("Select hair with styles.")
+@classmethod
+def needs_style(cls, context):
+    """`applies` of operators on the active style of the active hair."""
+    cls.poll_message_set("Select hair with styles.")
     return active_style_of(context) is not None
 
 
@@ -87,13 +88,10 @@ class VELLUS_OT_move_style(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.move_style"
     bl_label = "Move Style"
+    applies = needs_style
     __annotations__ = {
         "direction": properties.choice("Direction", "Direction to move the style in", {"UP": "Up", "DOWN": "Down"})
     }
-
-    @classmethod
-    def applies(cls, context):
-        return has_styles(cls, context)
 
     def change(self, context):
         hair = hair_of(context.object)
@@ -109,10 +107,7 @@ class VELLUS_OT_remove_style(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.remove_style"
     bl_label = "Remove Style"
-
-    @classmethod
-    def applies(cls, context):
-        return has_styles(cls, context)
+    applies = needs_style
 
     def change(self, context):
         hair = hair_of(context.object)
@@ -125,10 +120,7 @@ class VELLUS_OT_duplicate_style(_GivesStyles, bpy.types.Operator):
 
     bl_idname = "vellus.duplicate_style"
     bl_label = "Duplicate Style"
-
-    @classmethod
-    def applies(cls, context):
-        return has_styles(cls, context)
+    applies = needs_style
 
     def styles(self, context):
         return [style_items.settings_of(active_style_of(context))]
