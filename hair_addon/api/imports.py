@@ -24,7 +24,7 @@ from .blender_access import blender
 if TYPE_CHECKING:
     from ..blender.groom.foreign.hand_made_guides import HandMade
     from ..blender.groom.foreign.kept_hair import KeptHair
-    from ..blender.groom.transfer.groom_transfers import TransferredGroom
+    from ..blender.groom.transfer.system_transfer import TransferredGroom
     from ..blender.io.curve_files import Found
     from ..blender.io.mesh_hair import MeshHair
 
@@ -295,7 +295,7 @@ def transfer_groom(
     guides = blender.groom.pipeline.inputs_of(given)[0] if is_hair else blender.data.arguments.guides_of(given)
     target = blender.data.arguments.surface_object(surface)
     depsgraph = blender.data.scene.present_depsgraph()
-    work = blender.groom.transfer.groom_transfers.transferring(
+    work = blender.groom.transfer.system_transfer.transferring(
         guides, given if is_hair else None, target, wanted, depsgraph
     )
     return run_now(work, progress)

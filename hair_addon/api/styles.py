@@ -12,7 +12,7 @@ from ..core.files import style_presets
 from ..core.files.settings_file import require_styles
 from ..core.geometry.mesh import TriMesh
 from ..core.geometry.strands import Strands
-from ..core.grooming import following, groom, hair_styles
+from ..core.grooming import following, groom, style_binding
 from ..core.grooming.groom import HairSettings
 from ..core.long_work import Progress, no_progress, part_of, run_now
 from ..core.params import Param, array_of, declared, described, plain_value
@@ -127,9 +127,9 @@ def styled_strands(
     for style in styles:
         _require_arrays(style)
     binding = groom.bind_hair(mesh, guides, settings, progress=part_of(progress, 0.0, 0.5))
-    trees = hair_styles.clump_trees(mesh, guides.roots, settings)
+    trees = style_binding.clump_trees(mesh, guides.roots, settings)
     placing = part_of(progress, 0.5, 1.0)
-    styling = hair_styles.bind_styles(binding, guides, settings, styles, trees, inputs, progress=placing)
+    styling = style_binding.bind_styles(binding, guides, settings, styles, trees, inputs, progress=placing)
     return following.follow_guides(binding, guides, styling)
 
 

@@ -41,7 +41,7 @@ def run(given, console):
     started = time.perf_counter()
     guides, _settings = blender.groom.pipeline.inputs_of(hair)
     depsgraph = blender.data.scene.present_depsgraph()
-    work = blender.groom.transfer.groom_transfers.transferring(guides, hair, target, settings, depsgraph)
+    work = blender.groom.transfer.system_transfer.transferring(guides, hair, target, settings, depsgraph)
     made = run_now(work, console.progress)
     for sentence, values in made.notes():
         console.warn(sentence.format(**values))

@@ -15,7 +15,7 @@ from ...core.errors import HairError, memory_as_sentence
 from ...core.geometry import strands
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
-from ...core.grooming import following, groom, hair_styles
+from ...core.grooming import following, groom, style_binding
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.interpolation.regions import Regions
@@ -331,7 +331,7 @@ def _bind(surface, guides, settings, inputs, roots, progress):
 
 def _trees_on(surface, guides, settings, inputs):
     """Return a function that builds the `ClumpTrees` of hair."""
-    return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **inputs)
+    return lambda: style_binding.clump_trees(surface.mesh, guides.roots, settings, **inputs)
 
 
 def _styled(read, binding, guides, settings, surface, inputs, progress=no_progress):

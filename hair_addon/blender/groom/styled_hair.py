@@ -157,9 +157,9 @@ def bind(
 ) -> StyledHair:
     """Bind styles and lengths to strands; make_trees: called if one needs clump trees or a surface."""
     cut = strand_lengths.cut_mask(read.length, settings)
-    if cut is None and grooming.hair_styles.is_plain(guides, settings, read.styles):
+    if cut is None and grooming.style_binding.is_plain(guides, settings, read.styles):
         return StyledHair(read, None, make_trees)
-    styling = grooming.hair_styles.bind_styles(
+    styling = grooming.style_binding.bind_styles(
         binding,
         guides,
         settings,
@@ -170,7 +170,7 @@ def bind(
             numbers=varied_styles.number_maps(read.numbers),
             courses=varied_styles.courses(read.numbers),
         ),
-        grooming.hair_styles.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
+        grooming.style_binding.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
         progress,
         cut,
     )

@@ -18,18 +18,18 @@ from ..render.viewport import viewport
 from ..settings import animated, layer_items, style_items
 from . import (
     copied_faces,
+    density_updates,
     evaluation,
     events,
     file_changes,
     flattened_surfaces,
     hidden_previews,
     invalidation,
-    kept_densities,
+    last_update,
     live_hair,
     live_layers,
     moving_surfaces,
     refused_hair,
-    reported,
     simulated_hair,
     stale_marks,
     stored_guide_maps,
@@ -68,7 +68,7 @@ def after_depsgraph_update(scene, depsgraph):
     transformed = updates.originals(reports, is_transform=True)
     separated = _follow_surfaces(deformed, changed, transformed, depsgraph)
     _follow_places(updates.originals(reports, is_geometry=True, is_transform=True), transformed, scene, depsgraph)
-    reported.remember_places()
+    last_update.remember_places()
     if _is_undone:
         _is_undone = False
         _follow_undo(scene, depsgraph)
@@ -138,8 +138,8 @@ def _follow_places(moved, transformed, scene, depsgraph):
     stale_marks.follow_flow(moved, transformed, depsgraph)
     stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
     scaled = {datablock for datablock in transformed if isinstance(datablock, bpy.types.Object)}
-    kept_densities.follow(scaled, depsgraph)
-    kept_densities.follow_units(scene, depsgraph)
+    density_updates.follow(scaled, depsgraph)
+    density_updates.follow_units(scene, depsgraph)
     stale_marks.follow_ramps()
 
 
@@ -173,8 +173,8 @@ def _follow_geometry(changed, depsgraph):
             usable_surfaces.forget_orientation(datablock)
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
-            if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
-                combed[datablock] = stroke_limits.limited(datablock, reported.points_of(datablock), depsgraph)
+            if datablock.vellus.kind == "GUIDES" and last_update.have_guides_moved(datablock):
+                combed[datablock] = stroke_limits.limited(datablock, last_update.points_of(datablock), depsgraph)
     return combed
 
 
@@ -220,11 +220,11 @@ def _mark_painted(images, depsgraph):
         uid = surface.session_uid
         if surface.mode == "TEXTURE_PAINT":
             painting.add(uid)
-        if used & names or (reported.painting_cache.get(uid) and uid not in painting):
+        if used & names or (last_update.painting_cache.get(uid) and uid not in painting):
             stale_marks.follow_images(datablock, depsgraph)
-    reported.painting_cache.clear()
+    last_update.painting_cache.clear()
     for uid in painting:
-        reported.painting_cache.keep(uid, True)
+        last_update.painting_cache.keep(uid, True)
 
 
 @persistent
@@ -421,7 +421,7 @@ def unregister():
     simulated_hair.end()
     moving_surfaces.resume()
     hidden_previews.unregister()
-    kept_densities.unregister()
+    density_updates.unregister()
     live_hair.write_all()
     live_hair.cancel_writing()  # of hair that waits for its next evaluation
     composite.suspend()

@@ -13,7 +13,7 @@ from ..groom.surfaces import applied_transforms, edited_surfaces, kept_densities
 from ..groom.surfaces.edited_surfaces import Followed
 from ..host.notices import text_of
 from ..settings import marks, ramp_nodes, style_items
-from . import events, reported
+from . import events, last_update
 
 
 def follow_surface(surface_object, depsgraph, is_mesh_edited):
@@ -35,7 +35,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         redrawn = set(applied_transforms.followed_by(guides)) if followed is Followed.APPLIED else set()
         mark_followers(guides, redrawn)
         in_place |= redrawn
-    edited_surfaces.follow_alone(surface_object, depsgraph, reported.place_before)
+    edited_surfaces.follow_alone(surface_object, depsgraph, last_update.place_before)
     if is_mesh_edited:
         _follow_edited_mesh(surface_object, depsgraph, carried, in_place)
 
@@ -47,7 +47,7 @@ def _carry_guides(guides, depsgraph, is_mesh_edited):
     """
     state = guides.vellus
     try:
-        place = reported.place_before(guides)
+        place = last_update.place_before(guides)
         followed = edited_surfaces.follow_surface(guides, depsgraph, place, state.is_live)
         was_edited = followed is not Followed.NOTHING
         if was_edited:

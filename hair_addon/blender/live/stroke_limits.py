@@ -6,7 +6,7 @@ import bpy
 from ..data.strands import attributes, curves, frozen_points
 from ..groom.guides import outside_guides
 from ..layers import recording
-from . import reported
+from . import last_update
 
 _MODES = {"SCULPT_CURVES", "EDIT"}
 
@@ -14,13 +14,13 @@ _MODES = {"SCULPT_CURVES", "EDIT"}
 def begin(objects):
     """Note the points of guides among objects that entered a mode in which they are combed, before the first stroke."""
     for guides in {o.data for o in objects if o.type == "CURVES" and o.mode in _MODES}:
-        if guides.vellus.kind == "GUIDES" and reported.points_of(guides) is None:
-            reported.note_points(guides, curves.read_points(guides))
+        if guides.vellus.kind == "GUIDES" and last_update.points_of(guides) is None:
+            last_update.note_points(guides, curves.read_points(guides))
 
 
 def limited(guides, points, depsgraph):
     """Limit the points (N, 3) of combed guides, write and return them; return `points` if none is moved."""
-    former = reported.former_points_of(guides)
+    former = last_update.former_points_of(guides)
     if former is None or not _is_edited(guides, points):
         return points
     allowed = frozen_points.restored(guides, former, points)
@@ -31,7 +31,7 @@ def limited(guides, points, depsgraph):
         return points
     attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", allowed)
     guides.update_tag()
-    reported.note_points(guides, allowed)
+    last_update.note_points(guides, allowed)
     return allowed
 
 

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
         guide_shapes,
         guide_tool_settings,
         guide_trim,
-        hair_styles,
         layer_kernels,
         layer_transfer,
         painted_flow,
         rooted_curves,
+        style_binding,
         transfer_settings,
     )
 else:

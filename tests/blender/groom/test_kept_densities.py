@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.groom.transfer import groom_transfers
+from hair_addon.blender.groom.transfer import system_transfer
 from hair_addon.core.grooming.transfer_settings import TransferSettings
 from hair_addon.core.long_work import run_now
 
@@ -123,7 +123,7 @@ def test_a_density_goes_to_another_mesh(sphere):
     bpy.context.collection.objects.link(copy)
     update()
     guides, settings = hair.vellus.guide_curves, TransferSettings(alignment="LOCAL")
-    work = groom_transfers.transferring(guides, hair, copy, settings, bpy.context.evaluated_depsgraph_get())
+    work = system_transfer.transferring(guides, hair, copy, settings, bpy.context.evaluated_depsgraph_get())
     carried = run_now(work).hair
     assert abs(len(carried.curves) - 4 * COUNT) <= 1
     assert len(carried.vellus.guide_curves.curves) == len(guides.curves), "combed guides are carried, not placed"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.geometry import strands
-from hair_addon.core.grooming import following, groom, hair_styles
+from hair_addon.core.grooming import following, groom, style_binding
 from hair_addon.core.interpolation import hair_binding
 from hair_addon.core.styling import clump, curl
 from tests.support.devices import DEVICE
@@ -24,8 +24,8 @@ def styling(head, scalp, bound):
     """Return the styling of the same strands by locks that curl."""
     guides, binding = bound
     settings = groom.HairSettings(strand_count=2000)
-    trees = hair_styles.clump_trees(head, guides.roots, settings, density=scalp, device=DEVICE)
-    return hair_styles.bind_styles(binding, guides, settings, [clump.Settings(), curl.Settings(seed=1)], trees)
+    trees = style_binding.clump_trees(head, guides.roots, settings, density=scalp, device=DEVICE)
+    return style_binding.bind_styles(binding, guides, settings, [clump.Settings(), curl.Settings(seed=1)], trees)
 
 
 def test_a_style_is_in_strands_of_every_update(bound, styling):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.grooming import hair_styles
+from hair_addon.core.grooming import style_binding
 from hair_addon.core.styling import bend, braid, clump, courses, curl, frizz, kinds, lean, smooth
 from hair_addon.core.styling.masks import Inputs
 from tests.support.devices import DEVICE
@@ -67,7 +67,7 @@ def test_cut_strands_have_the_course_of_their_own_style(hair):
     """Strands that are cut before the styles keep the courses of their styles, which then have another place."""
     course = {(0, "radius"): np.full(2, 0.5)}
     found, wanted = (
-        hair_styles.bind_styles(
+        style_binding.bind_styles(
             hair.binding,
             hair.guides,
             replace(hair.settings, strand_length=length),

@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
-from hair_addon.core.grooming import hair_styles
+from hair_addon.core.grooming import style_binding
 from hair_addon.core.styling import base, bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
 from hair_addon.core.styling.masks import Inputs, Mask
 from tests.support.devices import DEVICE
@@ -231,7 +231,7 @@ def test_turned_moved_scaled_and_mirrored_before_or_after(rng, name, is_mirrored
         normals=normals @ turn.T,
         members=members,
         centre_normals=normals[::8] @ turn.T,
-        axes=hair_styles.own_axes(from_own),
+        axes=style_binding.own_axes(from_own),
     )
     # Coherent waves, and strands that wind about each other, have large derivatives.
     tolerance = {"FRIZZ": 1e-5, "BRAID": 2e-5, "ROPE": 2e-5}.get(name, 1e-5)

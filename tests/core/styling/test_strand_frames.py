@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.geometry.affine import Affine
-from hair_addon.core.grooming import hair_styles
+from hair_addon.core.grooming import style_binding
 from hair_addon.core.styling import bend, curl
 from tests.support.dynamics.stepped import UP, curved_strands, rotation, stepped, straight_strands
 from tests.support.strands.styled import straight
@@ -125,7 +125,7 @@ def test_frames_exist_everywhere(normal):
 def test_frames_turn_with_the_surface(rng):
     normals = unit(rng.normal(UP, 0.4, (50, 3)))
     turn = rotation(rng)
-    axes = hair_styles.own_axes(Affine.linear(turn).matrix)
+    axes = style_binding.own_axes(Affine.linear(turn).matrix)
     np.testing.assert_allclose(unit(phases(normals @ turn.T, None, axes)), unit(phases(normals)) @ turn.T, atol=1e-3)
 
 

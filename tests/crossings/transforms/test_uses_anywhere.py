@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom.dynamics import guide_baking
-from hair_addon.blender.groom.transfer import groom_transfers, library_groom
+from hair_addon.blender.groom.transfer import library_groom, system_transfer
 from hair_addon.blender.io import groom_export, groom_files, groom_library, groom_sources, hair_cards, hair_meshes
 from hair_addon.core.cards.card_settings import CardSettings, TubeSettings
 from hair_addon.core.files.export_settings import ExportSettings
@@ -179,7 +179,7 @@ def test_meshes_of_hair_are_where_it_is(placed_files, place, made):
 
 
 def transfer(target, _folder, **settings):
-    work = groom_transfers.transferring(
+    work = system_transfer.transferring(
         data("Guides"), data("Hair"), target, TransferSettings(**settings), bpy.context.evaluated_depsgraph_get()
     )
     made = run_now(work)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hair_addon.core.grooming import following, groom, hair_styles
+from hair_addon.core.grooming import following, groom, style_binding
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from tests.support.devices import DEVICE
 from tests.support.meshes import HEAD, flat_grid, read_obj, subdivided_sphere
@@ -19,7 +19,7 @@ class Groom:
         self.mesh, self.settings, self.device, self.axes, self.ground = mesh, hair_settings, device, axes, ground
         self.guides = groom.distribute_guides(mesh, guide_settings, device=device)
         self.binding = groom.bind_hair(mesh, self.guides, hair_settings, device=device, **ground)
-        self.trees = hair_styles.clump_trees(mesh, self.guides.roots, hair_settings, device=device, **ground)
+        self.trees = style_binding.clump_trees(mesh, self.guides.roots, hair_settings, device=device, **ground)
 
     def rooted(self, roots):
         """Return the same groom with strands at other roots."""
@@ -27,7 +27,7 @@ class Groom:
         other.binding = groom.bind_hair(
             self.mesh, self.guides, self.settings, roots=roots, device=self.device, **self.ground
         )
-        other.trees = hair_styles.clump_trees(
+        other.trees = style_binding.clump_trees(
             self.mesh, self.guides.roots, self.settings, device=self.device, **self.ground
         )
         return other
@@ -40,7 +40,7 @@ class Groom:
     def bound(self, *styles, inputs=None, point_count=None):
         """Return the `Styling` of styles."""
         settings = self.settings if point_count is None else replace(self.settings, point_count=point_count)
-        return hair_styles.bind_styles(self.binding, self.guides, settings, styles, self.trees, inputs, self.axes)
+        return style_binding.bind_styles(self.binding, self.guides, settings, styles, self.trees, inputs, self.axes)
 
     def styled(self, *styles, inputs=None, point_count=None, guides=None, chosen=None):
         """Return (S, P, 3), or (M, P, 3) of some strands."""

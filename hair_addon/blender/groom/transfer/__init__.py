@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from . import (
         carried_masks,
         groom_settings,
-        groom_transfers,
         library_groom,
+        system_transfer,
         transferred_names,
     )
 else:

@@ -20,7 +20,7 @@ from ...data import scene
 from ...groom.foreign import foreign_meshes, hand_made_guides, joined_curves, kept_hair, particle_hair
 from ...groom.foreign.foreign_curves import chosen, is_foreign, require_foreign
 from ...groom.selection import guides_of, hair_of, make_active, object_of, surface_of
-from ...groom.transfer import groom_transfers
+from ...groom.transfer import system_transfer
 from ...host import paths
 from ...host.datablocks import Remembered
 from ...settings import properties, setting_properties
@@ -424,7 +424,7 @@ class VELLUS_OT_transfer_groom(LongOperator, bpy.types.Operator):
         if hair is not None and hair.vellus.guide_curves != guides:
             hair = None
         settings = setting_properties.given_settings(self, TransferSettings)
-        return groom_transfers.transferring(
+        return system_transfer.transferring(
             guides, hair, self._target(context), settings, context.evaluated_depsgraph_get()
         )
 

@@ -16,7 +16,7 @@ from ...host.notices import text_of
 from ...settings import properties, setting_properties
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
-from .base.asked import AskedOperator
+from .base.dialog import DialogOperator
 from .base.file_browser import BrowsedOperator
 from .base.hair_operator import needs_hair
 
@@ -123,7 +123,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
         return "{guide_count} guides and {strand_count} strands written to {path}", counts
 
 
-class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
+class VELLUS_OT_hair_cards(DialogOperator, bpy.types.Operator):
     """Create ribbons that replace clumps of strands, with textures of the strands; the hair itself is kept"""
 
     bl_idname = "vellus.hair_cards"
@@ -168,7 +168,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         return text, counts | errors
 
 
-class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
+class VELLUS_OT_hair_tubes(DialogOperator, bpy.types.Operator):
     """Create a mesh with a closed tube for each strand; the hair itself is kept"""
 
     bl_idname = "vellus.hair_tubes"

@@ -6,7 +6,7 @@ import bpy
 from ...groom.selection import mesh_to_attach_to, parts_of, surface_of
 from ...groom.surfaces import attached_hair
 from ...groom.systems import edits
-from ...live import reported
+from ...live import last_update
 from .base.hair_operator import HairOperator, needs_surface
 
 
@@ -23,7 +23,7 @@ class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         parts, depsgraph = parts_of(context.object), context.evaluated_depsgraph_get()
-        attached_hair.attach(parts, mesh_to_attach_to(context), depsgraph, reported.place_before)
+        attached_hair.attach(parts, mesh_to_attach_to(context), depsgraph, last_update.place_before)
 
 
 class VELLUS_OT_make_uv_map(HairOperator, bpy.types.Operator):

@@ -5,7 +5,7 @@ import bpy
 import pytest
 
 from hair_addon.blender.host import running
-from hair_addon.blender.ui.operators.base.asked import AskedOperator
+from hair_addon.blender.ui.operators.base.dialog import DialogOperator
 from hair_addon.blender.ui.operators.base.modal import LongOperator
 from tests.support.interface.layout import redo_panel
 
@@ -27,7 +27,7 @@ def test_polygons_are_named_before_they_are_made(hair):
     )
 
 
-class Asked(AskedOperator):
+class Asked(DialogOperator):
     """A mock of a registered operator, which only Blender can create."""
 
     bl_idname = "VELLUS_OT_hair_tubes"  # as Blender names operators that are running

@@ -7,7 +7,7 @@ from .modal import LongOperator
 _WIDTH = 360  # width of the dialog [pixels]
 
 
-class AskedOperator(LongOperator):
+class DialogOperator(LongOperator):
     """Mixin of operators that open a dialog unless they are given a setting."""
 
     _is_asking = False
