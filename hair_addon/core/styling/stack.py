@@ -86,11 +86,11 @@ class Styling:
             return
         require_count("clump levels", len(centres), len(self.levels))
         for level, (its_points, rows) in zip(self.levels, centres, strict=True):
-            its_rows = _there(rows, len(level.data.normals), points.device)
+            its_rows = _on_device(rows, len(level.data.normals), points.device)
             steps.apply_steps(its_points, level.steps, level.data, self.axes, its_rows)
             self._keep_centres(its_points, np.arange(len(its_points)) if rows is None else rows, level.first)
         steps.apply_steps(
-            points, self.program, self.data, self.axes, _there(chosen, len(self.data.normals), points.device)
+            points, self.program, self.data, self.axes, _on_device(chosen, len(self.data.normals), points.device)
         )
 
     def centres_of(self, chosen: np.ndarray) -> list[np.ndarray]:
@@ -101,10 +101,10 @@ class Styling:
         """
         require_indices("strands", chosen, len(self.data.normals))
         members = self.data.members.numpy()[:, chosen]
-        read = [_present(members[row]) for row in range(len(self.levels))]
+        read = [_distinct(members[row]) for row in range(len(self.levels))]
         for row in range(len(self.levels) - 1, 0, -1):
             above = self.levels[row].data.members.numpy()[:row, read[row]]
-            read[:row] = [_present(np.append(*pair)) for pair in zip(read[:row], above, strict=True)]
+            read[:row] = [_distinct(np.append(*pair)) for pair in zip(read[:row], above, strict=True)]
         return read
 
     @cached_property
@@ -194,7 +194,7 @@ class Styling:
         return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
 
 
-def _there(rows, count, device):
+def _on_device(rows, count, device):
     """Return indices of strands on a device, None for all. Raises `HairError` for indices that do not exist."""
     if rows is None:
         return None
@@ -202,7 +202,7 @@ def _there(rows, count, device):
     return wp.array(rows, dtype=int, device=device)
 
 
-def _present(members):
+def _distinct(members):
     """Return the distinct indices of members, without -1."""
     return np.unique(members[members >= 0])
 
