@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 import weakref
@@ -24,6 +25,12 @@ IDLE = 300.0  # [s] without jobs after which the process ends
 _PACKAGE = Path(__file__).resolve().parents[2]
 _MOST_ATTEMPTS = 2  # to start a job
 _FIRST_LOOK, _LONGEST_LOOK = 0.002, 0.05  # [s] between checks while waiting
+
+_REMOVE = """
+import json, shutil, sys
+for folder in json.load(sys.stdin):
+    shutil.rmtree(folder, ignore_errors=True)
+"""
 
 _running = None  # the `_Process` of this Blender
 
@@ -146,3 +153,18 @@ def end():
     if _running is not None:
         _running.end()
     _running = None
+
+
+def exit_and_remove(folders):
+    """End this process and let another remove folders after that: until then jobs and Blender write into them."""
+    with contextlib.suppress(OSError):  # no process can start: the folders are left
+        remover = subprocess.Popen(
+            [sys.executable, "-I", "-c", _REMOVE],
+            stdin=subprocess.PIPE,  # closed by the end of this process
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        remover.stdin.write(json.dumps([str(each) for each in folders if os.path.exists(each)]).encode())
+        remover.stdin.flush()
+    os._exit(0)

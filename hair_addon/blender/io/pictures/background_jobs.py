@@ -5,8 +5,6 @@ import contextlib
 import json
 import os
 import queue
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -14,12 +12,6 @@ from ....core.errors import HairError, cause_of
 from ...data.pictures.picture_jobs import BLEND
 from ...host import background_process
 from . import light_panorama, surface_bake, world_panorama
-
-_REMOVE = """
-import json, shutil, sys
-for folder in json.load(sys.stdin):
-    shutil.rmtree(folder, ignore_errors=True)
-"""
 
 
 def serve(stream, temporary):
@@ -43,22 +35,7 @@ def _read(stream, folders, temporary):
         for line in lines:
             seen.append(json.loads(line))
             folders.put(seen[-1])
-    _end([*seen, temporary])
-
-
-def _end(folders):
-    """End this process and let another remove folders after that: until then jobs and Blender write into them."""
-    with contextlib.suppress(OSError):  # no process can start: the folders are left
-        remover = subprocess.Popen(
-            [sys.executable, "-I", "-c", _REMOVE],
-            stdin=subprocess.PIPE,  # closed by the end of this process
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-        )
-        remover.stdin.write(json.dumps([str(each) for each in folders if os.path.exists(each)]).encode())
-        remover.stdin.flush()
-    os._exit(0)
+    background_process.exit_and_remove([*seen, temporary])
 
 
 def _run(folder):
