@@ -15,7 +15,7 @@ from ...core.shading.tables import lookup_tables
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import text_of
-from . import setting_properties, style_items, style_keys
+from . import map_items, setting_properties, style_items, style_keys
 
 _GROUPS = {
     "guides": setting_properties.names_of(GuideSettings),
@@ -76,13 +76,15 @@ def _keyed():
 
 def _values(state):
     values = {name: setting_properties.values_of(getattr(state, name), names) for name, names in _GROUPS.items()}
-    return values | {_key(item): style_items.values_of(item) for item in state.styles}
+    values |= {_key(item): style_items.values_of(item) for item in state.styles}
+    return values | {_key_of_map(item): map_items.values_of(item) for item in state.maps}
 
 
 def _groups(state):
     """Return {key in `_values`: property group}."""
     groups = {name: getattr(state, name) for name in _GROUPS}
-    return groups | {_key(item): style_items.group_of(item) for item in state.styles}
+    groups |= {_key(item): style_items.group_of(item) for item in state.styles}
+    return groups | {_key_of_map(item): item for item in state.maps}
 
 
 def _at(datablock, paths):
@@ -98,3 +100,7 @@ def _at(datablock, paths):
 def _key(item):
     """Return the key of a style, independent of its index in the list."""
     return item.kind, text_of(item, "name")
+
+
+def _key_of_map(item):
+    return "map", text_of(item, "setting")

@@ -3,13 +3,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
 from ...core.maps import ramp_text, varied_settings
 from ...core.maps.map_settings import MapSettings
-from ..host.notices import name_of
-from . import ramp_nodes, setting_properties
+from ..host.notices import name_of, text_of
+from . import ramp_nodes, setting_properties, style_keys
 from .marks import mark_map
 from .translations import CONTEXT
 
@@ -18,6 +19,9 @@ def _mark_image(item, context):
     """Remember the name of a map's image, which a status shows if the image is deleted; an `update`."""
     item.source = "" if item.image is None else name_of(item.image)
     mark_map(item, context)
+
+
+_KEYED = ("kind", "low", "high", "is_inverted", "amount", "seed")
 
 
 class VellusMap(bpy.types.PropertyGroup):
@@ -71,6 +75,11 @@ def settings_of(item: VellusMap) -> MapSettings:
     if found.kind != "IMAGE":
         return found
     return found if item.image is None else replace(found, source=name_of(item.image))
+
+
+def values_of(item: VellusMap) -> dict[str, Any]:
+    """Return {name: value} of the settings of a map that can be keyed, for comparison."""
+    return setting_properties.values_of(item, _KEYED)
 
 
 def maps_of(state) -> tuple[MapSettings, ...]:
@@ -164,11 +173,20 @@ def remove(state, setting: str) -> bool:
         if item.setting == setting:
             mark_map(item, None)
             trees = item.ramp_tree, item.course_tree
-            state.maps.remove(index)
+            _remove_with_keys(state, index)
             for tree in trees:
                 ramp_nodes.remove_unused(tree)
             return True
     return False
+
+
+def _remove_with_keys(state, index):
+    """Remove a map with its keys; keys of the maps after it get their new indices."""
+    names = [text_of(item, "setting") for item in state.maps]
+    state.maps.remove(index)
+    places = [None if place == index else place - (place > index) for place in range(len(names))]
+    left = names[:index] + names[index + 1 :]
+    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, left, "maps"))
 
 
 def follow_styles(state, names: Sequence[str], places: Sequence[int | None], new_names: Sequence[str]) -> None:

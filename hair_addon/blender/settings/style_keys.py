@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Update of keys and drivers when styles, or layers of guides, are moved, removed or renamed.
+"""Update of keys and drivers when styles, layers of guides or maps are moved, removed or renamed.
 
 Blender keys a style's setting by its index, as vellus.styles[0].curl.radius, and does not update the index.
 """
@@ -14,7 +14,7 @@ _PATH = r'vellus\.{owner}\[(?:(\d{{1,6}})|"((?:[^"\\]|\\.)*)")\](.*)'
 class Rearrangement:
     """A change of a hair's styles: old `names`, their new indices `places` (None: removed), and `new_names`.
 
-    owner: name of the list, "styles" or "layers".
+    owner: name of the list, "styles", "layers" or "maps".
     """
 
     def __init__(self, names, places, new_names, owner="styles"):

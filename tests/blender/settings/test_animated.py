@@ -190,3 +190,20 @@ def test_what_a_script_sets_before_a_window_shows_its_file_is_in_the_hair(hair, 
     assert root_radius(hair) == pytest.approx(0.025)
     wanted = appearance.principled_sockets(appearance.Appearance(melanin=0.2))["Absorption Coefficient"]
     np.testing.assert_allclose(absorption(hair), wanted, rtol=1e-5)
+
+
+def test_keyed_maps_vary_the_hair_of_each_frame_and_keep_their_keys(hair):
+    """Keys of a map follow it when a map before it in the list is removed."""
+    api.set_map(hair, "strands.thickness", "strand", low=0.5)
+    api.set_map(hair, "strands.strand_length", "strand", low=1.0)
+    item = hair.data.vellus.maps[1]
+    for frame, low in ((1, 1.0), (11, 0.2)):
+        item.low = low
+        item.keyframe_insert("low", frame=frame)
+    bpy.context.scene.frame_set(1)
+    long = lengths_of(points(hair))
+    api.clear_map(hair, "strands.thickness")
+    bpy.context.scene.frame_set(11)
+    parts = lengths_of(points(hair)) / long
+    assert hair.data.vellus.maps[0].low == pytest.approx(0.2)
+    assert parts.min() < 0.25 and parts.mean() == pytest.approx(0.6, abs=0.1)
