@@ -22,7 +22,7 @@ _OF_SCENE = ("camera", "world", "frame_start", "frame_end", "frame_step")
 _OF_RENDER = (
     *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
     *("use_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y", "use_crop_to_border"),
-    *("fps", "fps_base", "filter_size", "use_lock_interface"),
+    *("fps", "fps_base", "frame_map_old", "frame_map_new", "filter_size", "use_lock_interface"),
     *("use_multiview", "views_format"),
     *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
     *("use_simplify", "simplify_subdivision_render"),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves_objects
+from hair_addon.blender.host import scene_time
 from hair_addon.blender.render.frames import composite
 from tests.support.pictures.rendering import configure, light_up, rendered
 
@@ -178,13 +179,16 @@ def test_an_artist_s_compositor_works_on_hair_too(cycles, tmp_path):
 
 
 def test_the_hair_s_scene_follows(cycles):
-    """The scene of the hair follows camera, size, exposure, samples and shutter curve, and hair that is added later."""
+    """The scene of the hair follows camera, size, exposure, samples, shutter curve and Time Stretching, and it has hair
+    that is added later.
+    """
     scene = bpy.context.scene
     bpy.ops.vellus.toggle_composite()
     other = bpy.data.objects.new("Other", bpy.data.cameras.new("Other"))
     scene.collection.objects.link(other)
     scene.camera, scene.render.resolution_x, scene.render.use_motion_blur = other, 33, True
     scene.vellus.sample_count = 9
+    scene.render.frame_map_old, scene.render.frame_map_new = 50, 200
     scene.timeline_markers.new("Cut", frame=7).camera = other
     late = bpy.data.objects.new("Late", cycles.data)
     scene.collection.objects.link(late)
@@ -192,6 +196,7 @@ def test_the_hair_s_scene_follows(cycles):
     hair_scene = scene.vellus.hair_scene
     assert (hair_scene.camera, hair_scene.render.resolution_x, hair_scene.vellus.sample_count) == (other, 33, 9)
     assert hair_scene.render.use_motion_blur
+    assert scene_time.remapping(hair_scene) == scene_time.remapping(scene) == 0.25
     for places in ([(0.0, 0.0), (0.3, 1.0), (0.6, 0.5), (1.0, 0.25)], [(0.0, 1.0), (1.0, 0.5)]):
         set_shutter(scene.render.motion_blur_shutter_curve, places)
         composite.follow(scene)
