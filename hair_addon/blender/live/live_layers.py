@@ -44,7 +44,7 @@ def follow_masks(surfaces, depsgraph):
 
 
 def follow_frame(depsgraph):
-    """Compose guides whose weights are animated; returns {guide Curves that moved: None}."""
+    """Compose guides whose weights, or eyes, are animated; returns {guide Curves that moved: None}."""
     moved = {}
     for guides in with_layers():
         if guides.animation_data is None:
@@ -52,8 +52,9 @@ def follow_frame(depsgraph):
         if scene_time.is_rendered(depsgraph):  # Blender animates the original values only for viewports
             animated = guides.evaluated_get(depsgraph).vellus.layers
             for item, other in zip(guides.vellus.layers, animated, strict=False):
-                if item.weight != other.weight:
-                    item.weight = other.weight
+                for name in ("is_on", "weight"):
+                    if getattr(item, name) != getattr(other, name):
+                        setattr(item, name, getattr(other, name))
         if layer_items.is_reweighed(guides.vellus) and _update(guides, depsgraph):
             moved[guides] = None
     return moved

@@ -10,6 +10,7 @@ from hair_addon import api
 from hair_addon.blender.data.strands import attributes, curves, layer_attributes
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import guide_layers, layer_kernels
+from tests.support.pictures import render_probe
 from tests.support.reading import points, write_points
 
 
@@ -306,6 +307,23 @@ def test_weights_are_animated(layered):
     bpy.ops.vellus.move_layer(direction="DOWN")
     scene.frame_set(1)
     np.testing.assert_allclose(points(layered), base, atol=1e-6)
+
+
+def test_renders_show_and_hide_layers_by_keys(layered):
+    """A render has its own animated values."""
+    state, is_on = layered.data.vellus, {}
+    comb(layered)
+    for frame in (1, 2):
+        state.layers[0].is_on = frame == 1
+        update()
+        is_on[frame] = points(bpy.data.objects["Hair"])
+        state.layers[0].keyframe_insert("is_on", frame=frame)
+    bpy.context.scene.frame_set(1)
+    with render_probe.reading(lambda depsgraph: curves.read_points(depsgraph.objects["Hair"].data)) as render:
+        shown = render(frames=(1, 2, 1))
+    for frame, strands in is_on.items():
+        np.testing.assert_allclose(shown[frame - 1].reshape(strands.shape), strands, atol=1e-5)
+    assert np.abs(is_on[1] - is_on[2]).max() > 0.05
 
 
 def test_combing_survives_other_settings_and_another_number_of_guides(layered):
