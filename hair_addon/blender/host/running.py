@@ -6,9 +6,11 @@ blocks all input except Esc and navigation.
 """
 
 import contextlib
+import sys
 
 import bpy
 
+_ADD_ON = __package__.rpartition(".blender.")[0]
 _job = None
 _work = None
 _timer = None
@@ -17,6 +19,24 @@ _timer = None
 def has_window():
     """Whether Blender has a window, and runs timers."""
     return not bpy.app.background
+
+
+def may_wait():
+    """Whether data may be written a moment after an update: in a window, unless a script that may read it updates."""
+    return has_window() and not _is_in_script()
+
+
+def _is_in_script():
+    """Whether a script or another add-on runs: the outermost function is not of this add-on.
+
+    Without a window every update comes from a script.
+    """
+    if bpy.app.background:
+        return False
+    frame = sys._getframe()
+    while frame.f_back is not None:
+        frame = frame.f_back
+    return not f"{frame.f_globals.get('__name__', '')}.".startswith(f"{_ADD_ON}.")
 
 
 def is_rendering():

@@ -3,7 +3,7 @@
 
 In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and so are looks from
 painted maps. The hair's Curves are written at the end of the interaction, or before they are read. Without a window
-the Curves are written at once.
+and in updates by scripts, which may read them next, they are written at once.
 """
 
 import sys
@@ -319,8 +319,8 @@ def cancel_writing():
 
 
 def write_soon(hair):
-    """Write hair after a pause in which nothing changes; at once without a window, or if modifiers take its strands."""
-    if not running.has_window() or _is_drawn_modified(hair):
+    """Write hair after a pause in which nothing changes; at once for scripts, or if modifiers take its strands."""
+    if not running.may_wait() or _is_drawn_modified(hair):
         _write(hair)
         return
     _begin_pause()
@@ -328,7 +328,7 @@ def write_soon(hair):
 
 def evaluate_shading(hair):
     """Update the look of hair. In a window, looks from maps are written after a pause if Vellus draws the hair."""
-    is_soon = running.has_window() and hair.vellus.is_drawn and not _is_drawn_modified(hair)
+    is_soon = running.may_wait() and hair.vellus.is_drawn and not _is_drawn_modified(hair)
     looks.evaluate_shading(hair, is_soon)
     if strand_maps.is_pending(hair):
         _begin_pause()

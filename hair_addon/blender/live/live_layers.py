@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live layers of guides: strokes are recorded in the active layer at their end, and changed weights move guides.
 
-In a window recording waits until a stroke has ended, so that its events cost nothing more. Without a window guides are
-recorded at once.
+In a window recording waits until a stroke has ended, so that its events cost nothing more. Without a window and
+in updates by scripts, guides are recorded at once.
 """
 
 import bpy
@@ -27,7 +27,7 @@ def follow(combed, depsgraph):
         if not layer_items.is_reweighed(guides.vellus):
             if guides not in combed:
                 continue
-            if running.has_window():
+            if running.may_wait():
                 record_soon()
                 continue
         if running.has_window() and live_hair.is_stroke_running():

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modal operators of all windows are found."""
+"""Modal operators of all windows are found, and updates by scripts are told from those of the window."""
 
+import _thread
+import queue
 from types import SimpleNamespace
 
 from hair_addon.blender.host import running
@@ -18,3 +20,15 @@ def test_handlers_without_an_operator_are_passed_over():
     assert not running.is_running("TRANSFORM_", managers(None, stroke))
     assert not running.is_running("SCULPT_", managers(None))
     assert not running.is_running("SCULPT_")
+
+
+def test_data_waits_in_a_window_but_not_for_scripts(monkeypatch):
+    """Blender calls handlers without a Python function around them; a thread begins without any, too."""
+    monkeypatch.setattr(running, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
+    found = queue.Queue()
+    names = {"__name__": "hair_addon.blender.live.handlers", "found": found, "running": running}
+    exec("def handler(): found.put(running.may_wait())", names)
+    _thread.start_new_thread(names["handler"], ())
+    assert found.get(timeout=10.0)
+    names["handler"]()
+    assert not found.get(timeout=10.0)

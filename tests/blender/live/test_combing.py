@@ -11,6 +11,7 @@ import pytest
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.host import running
 from hair_addon.blender.live import handlers, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
@@ -133,6 +134,16 @@ def test_a_pause_writes_unless_the_stroke_goes_on(hair, in_window, monkeypatch):
     monkeypatch.setattr(live_hair, "is_stroke_running", lambda: False)
     assert live_hair.write_after_pause() is None
     assert not np.array_equal(points(hair), before)
+    assert not bpy.app.timers.is_registered(live_hair.write_after_pause)
+
+
+def test_scripts_in_a_window_read_combed_hair_after_an_update(hair, in_window, monkeypatch):
+    monkeypatch.setattr(running, "_is_in_script", lambda: True)
+    before = points(hair)
+    for _ in stroke(bpy.data.objects["Guides"], [3, 4, 5], steps=1):
+        pass
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(hair), grown_from_nothing(hair)) and not np.array_equal(points(hair), before)
     assert not bpy.app.timers.is_registered(live_hair.write_after_pause)
 
 
