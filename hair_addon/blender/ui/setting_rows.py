@@ -305,22 +305,28 @@ def collider_rows(layout, owner):
 
 
 def all_guide_rows(layout, owner, surface):
-    """The rows of the Guides panel and those below it, for a redo panel."""
+    """The rows of the Guides panel and those below it, for a redo panel, where panels other than growth are closed."""
     guide_rows(layout, owner, surface)
-    growth_rows(titled(layout, "Growth"), owner)
-    placement_rows(titled(layout, "Placement"), owner)
+    _panel(layout, "Growth", False, growth_rows, owner)
+    _panel(layout, "Placement", True, placement_rows, owner)
 
 
 def all_strand_rows(layout, owner, surface, skip=()):
-    """The rows of the Strands panel and those below it, for a redo panel."""
+    """The rows of the Strands panel, and closed panels with the rows below it, for a redo panel."""
     strand_rows(layout, owner, surface, skip)
-    parting_rows(titled(layout, "Parting"), owner, surface)
-    blending_rows(titled(layout, "Advanced"), owner, skip)
+    _panel(layout, "Parting", True, parting_rows, owner, surface)
+    _panel(layout, "Advanced", True, blending_rows, owner, skip)
 
 
-def titled(layout, title):
-    """Return a column under a title."""
-    column = layout.column()
-    column.separator()
-    column.label(text=interface_text(title), translate=False)
-    return column
+def _panel(layout, title, is_closed, draw, *parameters):
+    """Draw rows in a panel; is_closed: until the user opens the panel, whose state Blender keeps."""
+    header, body = layout.panel(f"VELLUS_PT_redo_{title.lower()}", default_closed=is_closed)
+    header.label(text=interface_text(title), translate=False)
+    if body is not None:
+        draw(body, *parameters)
+
+
+def add_title(layout, title):
+    """Draw a title above the next rows."""
+    layout.separator()
+    layout.label(text=interface_text(title), translate=False)

@@ -400,9 +400,11 @@ def test_the_redo_panel_draws_every_property_once(hair, operator):
     make_active(REDO[operator][0])
     own = set(getattr(bpy.types, f"VELLUS_OT_{operator}").__annotations__)
     own -= {"radius", fitted_sizes.SHOWN}  # shown as a diameter: thickness; not for artists
-    drawn = redo(operator).drawn
+    layout = redo(operator)
+    drawn = layout.drawn
     assert {name: drawn[name] for name in own} == dict.fromkeys(own, 1)
     assert not drawn["radius"]
+    assert sum((drawn - layout.folded)[name] for name in own) <= 17  # rows before the user opens panels
 
 
 @pytest.mark.parametrize("operator", REDO)

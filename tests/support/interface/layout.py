@@ -12,10 +12,16 @@ SIDEBAR_WIDTH = 260  # pixels of the N-panel as Blender opens it
 
 
 class Layout:
-    """Records drawing calls; properties must exist on their owner, operators, menus and panels be registered."""
+    """Records drawing calls; properties must exist on their owner, operators, menus and panels be registered.
 
-    def __init__(self, whole=None):
+    `drawn` has everything, as if all panels were open; `folded` the part of it that panels hide until they are opened.
+    """
+
+    def __init__(self, whole=None, is_folded=False):
         self.drawn = Counter() if whole is None else whole.drawn
+        self.folded = Counter() if whole is None else whole.folded
+        self.panels = [] if whole is None else whole.panels  # their identifiers
+        self._is_folded = is_folded
         self.texts = [] if whole is None else whole.texts
         self.buttons = [] if whole is None else whole.buttons  # labels of operators
         self.picked = {} if whole is None else whole.picked  # property → the collection that it is picked from
@@ -23,7 +29,7 @@ class Layout:
         self._line = []
 
     def _part(self, align=False):
-        return Layout(self)
+        return Layout(self, self._is_folded)
 
     column = box = menu_pie = _part
 
@@ -31,6 +37,11 @@ class Layout:
         part = self._part()
         self.lines.append(part._line)
         return part
+
+    def panel(self, idname, default_closed=False):
+        assert idname not in self.panels
+        self.panels.append(idname)
+        return self._part(), Layout(self, self._is_folded or default_closed)
 
     def split(self, factor):
         assert 0.0 < factor < 1.0
@@ -65,6 +76,7 @@ class Layout:
     def prop(self, owner, name, text="", icon="NONE", emboss=True):
         assert name in owner.bl_rna.properties
         self.drawn[name] += 1
+        self.folded[name] += self._is_folded
 
     def prop_decorator(self, owner, name):
         assert name in owner.bl_rna.properties

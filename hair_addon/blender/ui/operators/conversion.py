@@ -60,7 +60,8 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
         for name in ("every", "applies_modifiers", "grows_hair"):
             setting_rows.row(self.layout, self.properties, name)
         if self.grows_hair:
-            setting_rows.all_strand_rows(setting_rows.titled(self.layout, "Strands"), self.properties, surface)
+            setting_rows.add_title(self.layout, "Strands")
+            setting_rows.all_strand_rows(self.layout, self.properties, surface)
 
     def seconds(self, context):
         if not self.grows_hair:

@@ -54,8 +54,8 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
     def draw(self, context):
         surface = surface_of(context.object)
         setting_rows.all_guide_rows(self.layout, self.properties, surface)
-        strands = setting_rows.titled(self.layout, "Strands")
-        setting_rows.all_strand_rows(strands, self.properties, surface, skip=_OWN)
+        setting_rows.add_title(self.layout, "Strands")
+        setting_rows.all_strand_rows(self.layout, self.properties, surface, skip=_OWN)
 
     def prefill(self, context):
         if not self.properties.is_property_set("density_group"):
