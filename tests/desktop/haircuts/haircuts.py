@@ -219,6 +219,7 @@ BUN = (
     lines("vellus.draw_tie", ((0.0, 0.055, 0.80), (0.0, 0.055, 0.83))),
     select("Head"),
     press("vellus.gather_guides", shape="BUN"),
+    fields("hair", point_count=97),  # the coil bends without corners
     *FLYAWAYS,
     press("vellus.apply_preset", preset="GINGER"),
 )
