@@ -323,7 +323,7 @@ def _panel(layout, title, is_closed, draw, *parameters):
     header, body = layout.panel(f"VELLUS_PT_redo_{title.lower()}", default_closed=is_closed)
     header.label(text=interface_text(title), translate=False)
     if body is not None:
-        draw(body, *parameters)
+        draw(body.column(), *parameters)
 
 
 def add_title(layout, title):
