@@ -31,35 +31,17 @@ def render(path, name, matrix, frame, is_coarse, out):
     directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse: render
     a small picture in less time.
     """
-    try:
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path)) as (_found, wanted):
-            wanted.lights = [name]
-        unsaved_images.restore(Path(out).parent)
-        scene = bpy.context.scene
-        scene.render.engine = "CYCLES"
-        (light,) = wanted.lights
-        tree = light.node_tree
-    except (OSError, RuntimeError, TypeError, ValueError, AttributeError) as error:
-        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
+    scene, light, tree = _opened(path, name, Path(out).parent)
     for setting, value in _PLAIN.items():
         setattr(light, setting, value)
     world_panorama.replace_light_paths(tree, set())
     _replace_falloffs(tree)
-    matrix = Matrix(matrix)
-    lamp = bpy.data.objects.new("Light", light)
-    scene.collection.objects.link(lamp)
-    lamp.matrix_world = matrix
-    camera = world_panorama.add_camera(scene)
-    camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
-    size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
-    camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
-    is_area = light.type == "AREA"
+    _place(scene, light, Matrix(matrix))
     pixels = {"SPOT": light_panoramas.SIZE, "AREA": light_panoramas.AREA_SIZE}.get(
         light.type, light_panoramas.WIDE_SIZE
     )
     pixels = light_panoramas.COARSE_SIZE if is_coarse else pixels
-    world_panorama.set_up(scene, AREA_SAMPLES if is_area else SAMPLES, pixels)
+    world_panorama.set_up(scene, AREA_SAMPLES if light.type == "AREA" else SAMPLES, pixels)
     scene.cycles.max_bounces = 0
     # The light shines into the lower latitudes. The others stay black.
     scene.render.use_border, scene.render.use_crop_to_border = True, False
@@ -68,13 +50,47 @@ def render(path, name, matrix, frame, is_coarse, out):
     scene_time.go_to_time(scene, frame)
     part = Path(out).with_suffix(".part.exr")
     lit = world_panorama.picture(scene, part)
-    emission = tree.nodes.new("ShaderNodeEmission")
-    emission.inputs["Strength"].default_value = 1.0
-    tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    _replace_nodes(tree)
     plain = world_panorama.picture(scene, part)
     np.savez(part.with_suffix(".npz"), lit=lit, plain=plain.mean(axis=-1))
     part.unlink()
     os.replace(part.with_suffix(".npz"), out)
+
+
+def _opened(path, name, folder):
+    """Return (scene, light, its nodes) of a new file with a light of a .blend. Raises `HairError`.
+
+    folder: of unsaved images.
+    """
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        with bpy.data.libraries.load(str(path)) as (_found, wanted):
+            wanted.lights = [name]
+        unsaved_images.restore(folder)
+        scene = bpy.context.scene
+        scene.render.engine = "CYCLES"
+        (light,) = wanted.lights
+        return scene, light, light.node_tree
+    except (OSError, RuntimeError, TypeError, ValueError, AttributeError) as error:
+        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
+
+
+def _place(scene, light, matrix):
+    """Add a light to a scene at a matrix (4, 4), with a camera there and a white sphere around both."""
+    lamp = bpy.data.objects.new("Light", light)
+    scene.collection.objects.link(lamp)
+    lamp.matrix_world = matrix
+    camera = world_panorama.add_camera(scene)
+    camera.matrix_world = matrix @ camera.rotation_euler.to_matrix().to_4x4()
+    size = max(getattr(light, one, 0.0) for one in ("shadow_soft_size", "size", "size_y"))
+    camera.data.clip_end = 10.0 * _add_sphere(_FAR * max(1.0, size), matrix.translation)
+
+
+def _replace_nodes(tree):
+    """Let a light shine as without nodes."""
+    emission = tree.nodes.new("ShaderNodeEmission")
+    emission.inputs["Strength"].default_value = 1.0
+    tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
 
 
 def _lit_part(light):
