@@ -22,46 +22,22 @@ ivec2 first_place()
   return ivec2(history.first_column, history.first_row);
 }
 
-void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
-{
-  place = clamp(place, ivec2(0), textureSize(depths, 0) - 1);
-  float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
-  if (depth < nearest) {
-    nearest = depth;
-    nearest_place = place;
-  }
-}
-
-// Position [pixels] in the previous picture of the nearest geometry in or beside a pixel, so that silhouettes move with their
-// objects. is_background: there is no geometry.
+// Position [pixels] in the previous picture of the nearest geometry in or beside a pixel. is_background: there is no geometry.
 vec2 place_before(ivec2 pixel, out bool is_background)
 {
-  int side = history.samples_per_side;
-  ivec2 corner = pixel * side - first_place();
-  ivec2 nearest_place = corner;
-  float nearest = 2.0;
-  for (int y = 0; y < side; y++) {
-    for (int x = 0; x < side; x++) {
-      look(corner + ivec2(x, y), nearest_place, nearest);
-    }
-  }
-  look(corner + ivec2(side, 0), nearest_place, nearest);
-  look(corner + ivec2(-1, 0), nearest_place, nearest);
-  look(corner + ivec2(0, side), nearest_place, nearest);
-  look(corner + ivec2(0, -1), nearest_place, nearest);
-  // A thin strand is in few samples: in front of the background, the search radius is larger.
-  if (nearest == 1.0) {
-    for (int turn = 0; turn < 4; turn++) {
-      int sign = (turn & 2) - 1;
-      look(corner + ivec2(2 * sign * side, 2 * side * (2 * (turn & 1) - 1)), nearest_place, nearest);
-      look(corner + ((turn & 1) == 0 ? ivec2(4 * sign * side, 0) : ivec2(0, 4 * sign * side)), nearest_place, nearest);
-    }
-  }
+  int nearest_place = int(texelFetch(places, pixel, 0).r);
+  int columns = textureSize(depths, 0).x;
+  ivec2 place = ivec2(nearest_place % columns, nearest_place / columns);
+  float nearest = uintBitsToFloat(texelFetch(depths, place, 0).r);
   is_background = nearest == 1.0;
   vec2 at = vec2(pixel) + 0.5;
-  bool is_hair = texelFetch(segments, nearest_place, 0).r < NO_SEGMENT;
-  if (is_hair ? history.has_hair_motion != 0 : history.has_surface_motion != 0 && !is_background) {
-    return at + texelFetch(motion, nearest_place, 0).xy;
+  if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
+    if (history.has_hair_motion != 0) {
+      return at + texelFetch(hair_motion, pixel, 0).xy;
+    }
+  }
+  else if (history.has_surface_motion != 0 && !is_background) {
+    return at + texelFetch(surface_motion, place, 0).xy;
   }
   vec4 clip = history.now_to_before * vec4(2.0 * at / history.size.xy - 1.0, 2.0 * nearest - 1.0, 1.0);
   return (clip.w > 0.0) ? (0.5 * clip.xy / clip.w + 0.5) * history.size.xy : vec2(-1.0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Motion vectors of strands.
+// Motion vectors of strands: HAS_AFTER: also from the next frame.
 
 #include "picture/motion.glsl"
 #include "picture/object_motion.glsl"
@@ -26,7 +26,11 @@ vec4 sample_value()
   ivec2 first = strand_first(strand_index);
   float t = place - float(point);
   vec3 now = place_between(strands, first, point, t);
-  vec3 after = place_between(strands_after, first, point, t);
+  vec4 now_clip = now_to_clip() * vec4(now, 1.0);
+  vec4 after_clip = now_clip;
+  if (HAS_AFTER) {
+    after_clip = after_to_clip() * vec4(place_between(strands_after, first, point, t), 1.0);
+  }
   vec3 before;
   int row = moved_row(strand_index);
   if (row > 0) {
@@ -36,10 +40,7 @@ vec4 sample_value()
   else {
     before = place_between(strands_before, first, point, t);
   }
-  return moved(now_to_clip() * vec4(now, 1.0),
-               before_to_clip() * vec4(before, 1.0),
-               after_to_clip() * vec4(after, 1.0),
-               motion.size.xy);
+  return moved(now_clip, before_to_clip() * vec4(before, 1.0), after_clip, motion.size.xy);
 }
 
 #include "visibility/strand_samples.glsl"

@@ -85,6 +85,32 @@ class _Placed:
             yield index, uniforms.uniform_buffer(record), window
 
 
+@dataclass(frozen=True)
+class NearestSamples:
+    """The sample that represents each pixel of a picture.
+
+    texture: its index in the textures of a `VisibilityBuffer`, row by row; per_side: samples along each side of a
+    pixel; corner: of the buffer in the picture [samples]; reach: maximum distance of the sample from its pixel
+    [pixels].
+    """
+
+    texture: gpu.types.GPUTexture
+    per_side: int
+    corner: tuple
+    reach: int
+
+    def window(self, window):
+        """Return the pixels (left, bottom, width, height) whose samples may be in a window of the buffer."""
+        size = self.texture.width, self.texture.height
+        found = []
+        for first, length, corner, most in zip(window[:2], window[2:], self.corner, size, strict=True):
+            low = max((first + corner) // self.per_side - self.reach, 0)
+            high = min(-(-(first + length + corner) // self.per_side) + self.reach, most)
+            found.append((low, max(high - low, 0)))
+        (left, width), (bottom, height) = found
+        return left, bottom, width, height
+
+
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -294,6 +320,17 @@ class VisibilityBuffer:
         function that returns (program, *inputs) for all linked hair with these indices, or None.
         """
         texture = self._parts[texture_format, _NOTHING][1]
+        self._fill_by(program, texture, inputs, joined)
+        return texture
+
+    def fill_nearest(self, texture, nearest, program, inputs, joined):
+        """Fill the pixels of a texture whose nearest sample shows hair by a program, as `part_by` fills samples.
+
+        nearest: the `NearestSamples` of the pixels.
+        """
+        self._fill_by(program, texture, inputs, joined, nearest)
+
+    def _fill_by(self, program, texture, inputs, joined, nearest=None):
         for placed in self._hair:
             together = None if placed.objects is None or joined is None else joined(placed.indices)
             if together is not None:
@@ -301,16 +338,14 @@ class VisibilityBuffer:
                 program_of_all.bind()
                 blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
                 textures = textures | self._declare_objects(placed, program_of_all)
-                self._fill(
-                    placed, program_of_all, texture, {"shared_view": placed.view, **blocks}, textures, placed.window
-                )
+                blocks["shared_view"] = placed.view
+                self._fill(placed, program_of_all, texture, blocks, textures, placed.window, nearest)
                 continue
             own = {} if placed.layers is None else dict.fromkeys(scene_programs.VISIBILITY_SAMPLERS, white())
             for index, view, window in placed.each():
                 records, textures = ({}, {}) if inputs is None else inputs[index]
                 blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
-                self._fill(placed, program, texture, {"view": view, **blocks}, own | textures, window)
-        return texture
+                self._fill(placed, program, texture, {"view": view, **blocks}, own | textures, window, nearest)
 
     def part_of_light(self, lobes, world):
         """Return a texture of a part of the light of the last added hair, premultiplied.
@@ -468,8 +503,10 @@ class VisibilityBuffer:
         program.uniform_int("last_segment", placed.objects.last_segment)
         return {"objects": placed.objects.texture}
 
-    def _fill(self, placed, program, picture, blocks, textures, window):
-        """Run a program on the samples of a window in which a hair is nearest."""
+    def _fill(self, placed, program, picture, blocks, textures, window, nearest=None):
+        """Run a program on the samples of a window in which a hair is nearest, or on the pixels of `NearestSamples`."""
+        if nearest is not None:
+            window, textures = nearest.window(window), textures | {"places": nearest.texture}
         left, bottom, *size = window
         blocks = {"lights": placed.lights, **blocks}
         grid = light_grid.none()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion vectors of everything drawn, from the previous frame and to the next frame."""
 
+import functools
 from collections import Counter
 from dataclasses import dataclass
 
@@ -105,23 +106,53 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
 
     has_surfaces: whether to include motion vectors of surfaces.
     """
-    surfaces = zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True) if has_surfaces else ()
-    with buffer.surfaces_of_part(picture_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _parts), owner in surfaces:
+    with buffer.surfaces_of_part(picture_programs.MOTION_FORMAT):
+        if has_surfaces:
+            _draw_surfaces(drawn, motion, view)
+    program, inputs = picture_programs.strand_motion_program(), _of_hair(drawn, motion)
+    joined = functools.partial(_joined, inputs, is_nearest=False)
+    return buffer.part_by(program, picture_programs.MOTION_FORMAT, inputs, joined)
+
+
+def draw_nearest(drawn, motion, buffer, texture, nearest):
+    """Fill a texture of pixels with the motion vectors of hair [pixels] to the previous frame.
+
+    nearest: `visibility_buffer.NearestSamples` of the pixels; pixels that show no hair are not filled.
+    """
+    program, inputs = picture_programs.strand_motion_program(is_nearest=True), _of_hair(drawn, motion)
+    buffer.fill_nearest(texture, nearest, program, inputs, functools.partial(_joined, inputs, is_nearest=True))
+
+
+def draw_surfaces(drawn, motion, view, buffer):
+    """Return a texture of motion vectors [pixels] of surfaces to the previous frame, for the samples of a
+    `VisibilityBuffer`.
+    """
+    with buffer.surfaces_of_part(picture_programs.CARRIED_MOTION_FORMAT):
+        _draw_surfaces(drawn, motion, view)
+    return buffer.part(picture_programs.CARRIED_MOTION_FORMAT)
+
+
+def _draw_surfaces(drawn, motion, view):
+    """Draw motion vectors of surfaces into the bound framebuffer."""
+    program = picture_programs.surface_motion_program()
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True):
             record, samplers = motion.surface(owner)
             blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
-            with drawing.bound(picture_programs.surface_motion_program(), blocks, samplers):
-                surface.corners.triangles.draw(picture_programs.surface_motion_program())
-    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
-    program = picture_programs.strand_motion_program()
-    return buffer.part_by(program, picture_programs.MOTION_FORMAT, inputs, lambda indices: _joined(inputs, indices))
+            with drawing.bound(program, blocks, samplers):
+                surface.corners.triangles.draw(program)
 
 
-def _joined(inputs, indices):
+def _of_hair(drawn, motion):
+    """Return [({instance: record}, {sampler: texture})] of all hair."""
+    return [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
+
+
+def _joined(inputs, indices, is_nearest):
     """Return (program, {instance: record}, {sampler: texture}) for all linked hair objects; None if their textures
     differ.
 
-    inputs: ({"motion": record}, {sampler: texture}) of each hair; indices: (N,) of the objects.
+    inputs: from `_of_hair`; indices: (N,) of the objects; is_nearest: as in `strand_motion_program`.
     """
     records, textures = zip(*[inputs[index] for index in indices.tolist()], strict=True)
     records = np.array([record["motion"] for record in records])
@@ -134,7 +165,7 @@ def _joined(inputs, indices):
     for place, name in enumerate(("before_to_clip", "now_to_clip", "after_to_clip")):
         texels[: len(records), 4 * place : 4 * place + 4] = records[name]
     moved = driver_textures.new_texture((12, len(texels)), "RGBA32F", texels)
-    program = picture_programs.strand_motion_program(is_batch=True)
+    program = picture_programs.strand_motion_program(True, is_nearest)
     return program, {"motion": records[0]}, {**textures[0], "object_motions": moved}
 
 

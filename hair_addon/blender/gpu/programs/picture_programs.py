@@ -54,24 +54,30 @@ def strand_arrival_program():
 
 
 MOTION_FORMAT = "RGBA32F"  # of motion vectors
+CARRIED_MOTION_FORMAT = "RG32F"  # of those to the previous frame alone
 
 
 @shaders.cached
-def strand_motion_program(is_batch=False):
-    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp; is_batch: for linked
-    hair objects, with the sampler of picture/batch_motion.glsl.
+def strand_motion_program(is_batch=False, is_nearest=False):
+    """Return the compute program of motion vectors of strands: see picture/strand_motion.comp.
+
+    is_batch: for linked hair, with the sampler of picture/batch_motion.glsl; is_nearest: to the previous frame alone,
+    for the nearest sample of each pixel, with the sampler of picture/nearest_sample.glsl.
     """
-    names = (
-        "strands_before",
-        "strands_after",
-        "moved_rows",
-        "moved_points",
-        *(("object_motions",) if is_batch else ()),
-    )
-    samplers = tuple((name, "FLOAT_2D") for name in names)
-    info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT, is_batch=is_batch)
+    samplers = [
+        *((name, "FLOAT_2D") for name in ("strands_before", "strands_after", "moved_rows", "moved_points")),
+        *((("object_motions", "FLOAT_2D"),) if is_batch else ()),
+        *((("places", "UINT_2D"),) if is_nearest else ()),
+    ]
+    texture_format = CARRIED_MOTION_FORMAT if is_nearest else MOTION_FORMAT
+    info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, texture_format, is_batch=is_batch)
     info.uniform_buf(2, "Motion", "motion")
-    replaced = {"picture/object_motion.glsl": "picture/batch_motion.glsl"} if is_batch else {}
+    info.define("HAS_AFTER", str(not is_nearest).lower())
+    replaced = {}
+    if is_batch:
+        replaced["picture/object_motion.glsl"] = "picture/batch_motion.glsl"
+    if is_nearest:
+        replaced["visibility/own_sample.glsl"] = "picture/nearest_sample.glsl"
     return scene_programs.compile_samples(info, "picture/strand_motion.comp", replaced, is_batch)
 
 
@@ -128,12 +134,24 @@ def carry_program():
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
     of_blocks = ("before_mean", "before_deviation", "now_mean", "now_deviation")
-    for slot, name in enumerate(("depths", "segments")):
+    for slot, name in enumerate(("depths", "segments", "places")):
         info.sampler(slot, "UINT_2D", name)
-    of_light = ("light_before", "light_now")
-    for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion", *of_light), start=2):
+    moved, of_light = ("hair_motion", "surface_motion"), ("light_before", "light_now")
+    for slot, name in enumerate(("before", "before_passes", *of_blocks, *moved, *of_light), start=3):
         info.sampler(slot, "FLOAT_2D", name)
     return _written(info, "picture/history_carry.comp", CARRIED_IMAGES)
+
+
+@shaders.cached
+def places_program():
+    """Return the compute program of the sample that represents each pixel: see picture/history_places.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.typedef_source(uniforms.HISTORY.source)
+    info.uniform_buf(0, "History", "history")
+    info.sampler(0, "UINT_2D", "depths")
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
+    info.image(0, "R32UI", "UINT_2D", "places", qualifiers={"WRITE"})
+    return shaders.compile_compute(info, "picture/history_places.comp")
 
 
 @shaders.cached

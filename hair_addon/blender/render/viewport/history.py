@@ -13,11 +13,13 @@ import numpy as np
 
 from ...gpu import drawing
 from ...gpu.programs import picture_programs, uniforms
+from ...gpu.visibility_buffer import NearestSamples
 from .. import motion_vectors
 
 # Maximum weight of the last picture in passes: of the same strands, and of others, whose noise would hide changes.
 _MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
 _MOST_OF_STILL = 96.0  # if only lights have moved: the picture is not blurred, and only light may lag
+_REACH = 5  # pixels: the search radius of picture/history_places.comp, and one
 
 
 class _Targets:
@@ -72,6 +74,7 @@ class History:
         self.size = size
         self._shown = self._before = None  # _Targets: the picture, and its weight in passes
         self._carried = self._blocks = None
+        self._places = self._moved = None  # textures: the sample that represents each pixel, and its motion vector
         self._seen = None
         self._is_carried = False
         self._relit = None  # _Targets: blocks of samples with the former lights, and with the current lights
@@ -103,6 +106,8 @@ class History:
     def _allocate(self):
         images = picture_programs.CARRIED_IMAGES
         self._shown, self._before, self._carried = (_Targets(self.size, images) for _ in range(3))
+        self._places = gpu.types.GPUTexture(self.size, format="R32UI")
+        self._moved = gpu.types.GPUTexture(self.size, format=picture_programs.CARRIED_MOTION_FORMAT)
         blocks = tuple(-(-length // picture_programs.BLOCK_SIDE) for length in self.size)
         self._blocks = [_Targets(blocks, picture_programs.BLOCK_IMAGES) for _ in range(2)]
 
@@ -156,10 +161,16 @@ class History:
         record["is_still"], record["has_lit_surfaces"] = self._is_relit, has_lit_surfaces
         if record["is_still"]:
             record["most_passes"] = _MOST_OF_STILL
-        motion = light[0]
-        if has_hair or has_surfaces:
-            steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)
-            motion = motion_vectors.draw(drawn, steps, view, buffer, has_surfaces)
+        if not record["is_still"]:
+            self._find_places(record, buffer)
+        hair_motion = surface_motion = light[0]
+        motion = motion_vectors.Motion(before.places, now.places, now.places, self.size)
+        if has_hair:
+            hair_motion = self._moved
+            nearest = NearestSamples(self._places, detail.per_side, detail.corner, _REACH)
+            motion_vectors.draw_nearest(drawn, motion, buffer, hair_motion, nearest)
+        if has_surfaces:
+            surface_motion = motion_vectors.draw_surfaces(drawn, motion, view, buffer)
         program = picture_programs.blocks_program()
         for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
             blocks.fill(program, {"picture": of[0]}, weight=of[1])
@@ -171,13 +182,22 @@ class History:
             "before_deviation": before_blocks.textures[1],
             "now_mean": now_blocks.textures[0],
             "now_deviation": now_blocks.textures[1],
-            "motion": motion,
+            "hair_motion": hair_motion,
+            "surface_motion": surface_motion,
             "light_before": (self._relit or self._blocks)[0].textures[0],
             "light_now": (self._relit or self._blocks)[1].textures[0],
             "depths": buffer.nearest_depths(),
             "segments": buffer.segments,
+            "places": self._places,
         }
         self._carried.fill(picture_programs.carry_program(), samplers, {"history": record})
+
+    def _find_places(self, record, buffer):
+        """Find the sample that represents each pixel."""
+        program, blocks = picture_programs.places_program(), {"history": uniforms.uniform_buffer(record)}
+        with drawing.bound(program, blocks, {"depths": buffer.nearest_depths()}):
+            program.image("places", self._places)
+            drawing.dispatch_over(program, self.size)
 
     def _mix(self, light, pass_count, part_left):
         sums, weight = light

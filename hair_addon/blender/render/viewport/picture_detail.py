@@ -17,7 +17,7 @@ _MOST_PER_SIDE = 6  # samples along each side of a pixel: about as many as in a 
 _WANTED_SAMPLES = 48_000
 _LARGEST_PART = 1.0 / 4.0
 
-_MARGIN = 6  # pixels around the hair, where hair may have been before: the search radius of picture/history_carry.comp
+_MARGIN = 6  # pixels around the hair, where hair may have been before: the search radius of picture/history_places.comp
 _SIZE_STEP = 16  # pixels: textures are created again when the size changes
 
 

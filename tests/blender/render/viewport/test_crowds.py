@@ -4,14 +4,17 @@
 import sys
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data.pictures import drawn_meshes, viewport_shading
 from hair_addon.blender.gpu import ambient_visibility, shadows, solid_shading, strand_batches, surface_textures
+from hair_addon.blender.gpu.programs import picture_programs, uniforms
+from hair_addon.blender.gpu.visibility_buffer import NO_SEGMENT, NearestSamples
 from hair_addon.blender.render import drawn_scene, light_paths, motion_vectors
-from hair_addon.blender.render.viewport import hair_picture, picture_detail
+from hair_addon.blender.render.viewport import hair_picture, history, picture_detail
 from hair_addon.blender.render.viewport.outline import HairOutline, OutlineStyle
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.shading.light_paths import strand_grid
@@ -246,6 +249,15 @@ def test_calls_of_a_frame_do_not_grow_with_the_number_of_heads(thin, monkeypatch
     assert found[0] == found[1] and min(found[0]) > 3
 
 
+def nearest_samples(picture):
+    """Return the `NearestSamples` of a picture."""
+    found, detail, record = history.History(SIZE), picture._detail, uniforms.HISTORY.record()
+    found._allocate()
+    record["samples_per_side"] = detail.per_side
+    found._find_places(record, picture._pass)
+    return NearestSamples(found._places, detail.per_side, detail.corner, history._REACH)
+
+
 def test_motion_of_linked_heads_is_found_together(thin, monkeypatch):
     """Heads that move apart have the motion vectors of heads one by one, with as many calls for 4 as for 2."""
     monkeypatch.setattr(picture_detail, "_MOST_PER_SIDE", 2)
@@ -269,12 +281,20 @@ def test_motion_of_linked_heads_is_found_together(thin, monkeypatch):
         arguments = after, motion, picture._view, picture._pass, False
         with monkeypatch.context() as patch:
             if is_single:
-                patch.setattr(motion_vectors, "_joined", lambda *_given: None)
+                patch.setattr(motion_vectors, "_joined", lambda *_given, **_named: None)
             motion_vectors.draw(*arguments)
             with Calls() as calls:
                 vectors = motion_vectors.draw(*arguments)
+            of_pixels = gpu.types.GPUTexture(SIZE, format=picture_programs.CARRIED_MOTION_FORMAT)
+            nearest = nearest_samples(picture)
+            with Calls() as nearest_calls:
+                motion_vectors.draw_nearest(after, motion, picture._pass, of_pixels, nearest)
         found.append(np.array(vectors.read(), np.float32))
-        draws.append(calls.draws)
+        draws.append((calls.draws, nearest_calls.draws))
+        places = np.array(nearest.texture.read(), np.int64).ravel()
+        is_hair = np.array(picture._pass.segments.read(), np.int64).ravel()[places] < NO_SEGMENT
+        shown, expected = np.array(of_pixels.read(), np.float32).reshape(-1, 2), found[-1].reshape(-1, 4)[places, :2]
+        np.testing.assert_array_equal(shown[is_hair], expected[is_hair])
     np.testing.assert_array_equal(found[0], found[1])
     assert draws[0] == draws[2] < draws[1]
     assert np.abs(found[0]).max() > 0.5

@@ -8,7 +8,7 @@ from scipy.ndimage import binary_dilation
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import drawing, strand_textures
-from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.gpu.visibility_buffer import NO_SEGMENT, VisibilityBuffer
 from hair_addon.blender.render import drawn_scene, hair_cache, motion_vectors, scene_drawing
 from hair_addon.blender.render.viewport import hair_picture, view_film
 from tests.support.pairs import share_of
@@ -28,9 +28,9 @@ def camera():
     return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
 
 
-def new_picture(kind, size=SIZE):
+def new_picture(kind, size=SIZE, side=1):
     if kind == "HAIR":
-        return hair_picture.HairPicture((size, size), 1)
+        return hair_picture.HairPicture((size, size), side)
     return view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
 
 
@@ -221,6 +221,51 @@ def push_surface(frame):
 def comb_aside(frame):
     if frame:
         comb(bpy.data.objects["Guides"], (0.2, 0.0, 0.0))
+
+
+def nearest_beside(depths, side):
+    """Return (height, width) indices of the nearest sample in or beside each pixel, by brute force."""
+    rows, columns = (np.arange(length // side)[:, None] for length in depths.shape)
+    inside = [(y, x) for y in range(side) for x in range(side)] + [(0, side), (0, -1), (side, 0), (-1, 0)]
+    around = [(2 * y * side, 2 * x * side) for y, x in ((-1, -1), (1, -1), (-1, 1), (1, 1))]
+    around += [(0, -4 * side), (-4 * side, 0), (0, 4 * side), (4 * side, 0)]
+
+    def nearest(places):
+        down = np.stack([(side * rows + y).clip(0, len(depths) - 1) + 0 * columns.T for y, _x in places])
+        along = np.stack([(side * columns.T + x).clip(0, depths.shape[1] - 1) + 0 * rows for _y, x in places])
+        least = depths[down, along].argmin(axis=0)[None]
+        return tuple(np.take_along_axis(found, least, axis=0)[0] for found in (down, along))
+
+    chosen = nearest(inside)
+    chosen = np.where(depths[chosen] == 1.0, nearest(inside + around), chosen)
+    return chosen[0] * depths.shape[1] + chosen[1]
+
+
+@pytest.mark.parametrize(("scale", "side"), [(1.0, 2), (0.01, 1)])
+def test_pixels_move_with_their_nearest_sample(lit, monkeypatch, scale, side):
+    """The motion vector of a pixel is that of the nearest sample in or beside it, in a part of the picture too."""
+    bpy.data.objects["Sphere"].scale = (-scale, scale, scale)
+    if scale < 1.0:
+        bpy.context.scene.camera.location.y *= 4.0 * scale
+    picture, found, draw = new_picture("HAIR", SIZE, side), [], motion_vectors.draw_nearest
+    monkeypatch.setattr(motion_vectors, "draw_nearest", lambda *given: (draw(*given), found.append(given)))
+    for degrees in (0.0, 5.0):
+        turn_object(degrees)
+        drawn, view = read_drawn(), camera()
+        move(picture, drawn, view)
+    ((drawn, motion, buffer, texture, nearest),) = found
+    vectors = np.array(motion_vectors.draw(drawn, motion, picture._view, buffer, has_surfaces=False).read(), np.float32)
+    width, height = buffer.size
+    depths = np.array(buffer.depths.read(), np.int64).astype(np.uint32).view(np.float32).reshape(height, width)
+    left, bottom, columns, rows = picture._detail.tile
+    inside = np.s_[bottom : bottom + rows, left : left + columns]
+    places = np.array(nearest.texture.read(), np.int64).reshape(SIZE, SIZE)[inside]
+    np.testing.assert_array_equal(places, nearest_beside(depths, picture._detail.per_side))
+    is_hair = np.array(buffer.segments.read(), np.int64).reshape(height, width).ravel()[places] < NO_SEGMENT
+    shown = np.array(texture.read(), np.float32).reshape(SIZE, SIZE, 2)[inside]
+    np.testing.assert_array_equal(shown[is_hair], vectors.reshape(-1, 4)[places][is_hair, :2])
+    assert is_hair.sum() > 50 and np.abs(shown[is_hair]).max() > 0.01
+    assert (scale == 1.0) == (picture._detail.tile == (0, 0, SIZE, SIZE))
 
 
 @pytest.mark.parametrize("push", [push_surface, comb_aside])
