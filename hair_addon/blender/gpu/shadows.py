@@ -76,13 +76,14 @@ class ShadowMaps:
         textures = (self._hair_front, self._hair_layers, self._surface_moments, patterns)
         return dict(zip(scene_programs.SHADOW_SAMPLERS, textures, strict=True))
 
-    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None):
+    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None, counted=None):
         """Draw the maps and write each light's part in them into its record.
 
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU];
         steps: level of detail of each hair; casters: a light's index → (hair, surfaces) that cast its shadow, None:
         all; is_steady: keep the aim of maps as long as hair fits; chosen: index of the only light whose map is drawn,
-        None: all.
+        None: all; counted: maximum number of strands of each hair in layers, thicker in proportion, while all strands
+        bound the hair, None: all strands.
         """
         lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
@@ -103,7 +104,7 @@ class ShadowMaps:
                 if casters is not None:
                     casting, blocking = casters(index)
                     cast = _linked(casting), blocking
-                self._draw_light(index, view, lights, light_block, *cast, steps, is_steady)
+                self._draw_light(index, view, lights, light_block, *cast, steps, is_steady, counted)
 
     def _aimed(self, index, light, hair, loose):
         """`_aim`, cached while the light and the sphere stay the same."""
@@ -124,9 +125,12 @@ class ShadowMaps:
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
 
-    def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady):
+    def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady, counted):
         hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
-        placed = [(strands, _records(strands, view, to_world, steps, is_steady)) for strands, to_world in linked]
+        placed = []
+        for strands, to_world in linked:
+            records = _records(strands, view, to_world, steps, is_steady)
+            placed.append((strands, records, _fewer(records, counted)))
         drawn_with = self._new_strands(layer, view, lights, placed)
         if drawn_with is None:
             return
@@ -142,8 +146,9 @@ class ShadowMaps:
 
         Most maps stay while one of many lights moves. Changed strands are another `StrandsOnGPU`.
         """
-        light, strands = lights["light"][int(view["light_index"])], [one for one, _records in placed]
-        drawn_with = view.tobytes(), light.tobytes(), *(records.tobytes() for _one, records in placed)
+        light, strands = lights["light"][int(view["light_index"])], [one for one, *_records in placed]
+        all_records = [records.tobytes() for _one, *both in placed for records in both]
+        drawn_with = view.tobytes(), light.tobytes(), *all_records
         surfaces, drawn_before, before = self._strands.get(layer, (None, None, ()))
         if surfaces is self._surfaces[layer] and drawn_before == drawn_with:
             if all(known() is one for known, one in zip(before, strands, strict=True)):
@@ -207,7 +212,7 @@ class ShadowMaps:
     def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs, with integer sums that do not depend on the order.
 
-        placed: [(StrandsOnGPU, (N,) records)].
+        placed: [(StrandsOnGPU, (N,) records, (N,) records of counted strands)].
         """
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
@@ -215,12 +220,13 @@ class ShadowMaps:
             self._clear_ends()
             self._counts.clear(format="UINT", value=(0,))
         self._is_empty = False
-        placed = [
-            (strands, records[0], strand_batches.objects_of(records), uniforms.uniform_buffer(records[0]))
-            for strands, records in placed
+        bounding = [(strands, *_on_gpu(records)) for strands, records, _counted in placed]
+        counting = [
+            bound if counted is records else (strands, *_on_gpu(counted))
+            for bound, (strands, records, counted) in zip(bounding, placed, strict=True)
         ]
         for is_front in (True, False):
-            for strands, record, objects, view in placed:
+            for strands, record, objects, view in bounding if is_front else counting:
                 program = scene_programs.strand_shadow_program(is_front, objects is not None)
                 if objects is None:
                     blocks = {"view": view, "lights": lights}
@@ -239,7 +245,8 @@ class ShadowMaps:
 
     def _draw_strips(self, layer, placed, lights, hidden):
         """Draw a map of strands as triangle strips; placed: as for `_walk`."""
-        each = [(strands, record) for strands, records in placed for record in records]
+        each = [(strands, record) for strands, records, _counted in placed for record in records]
+        counting = [(strands, record) for strands, _records, counted in placed for record in counted]
         self._clear_ends()
         end = scene_programs.strip_program(
             "shadows/shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden)
@@ -256,7 +263,7 @@ class ShadowMaps:
             self._target(self._hair_layers, layer),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
-            for strands, record in each:
+            for strands, record in counting:
                 drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front, **hidden})
 
     def _fill_fronts(self, layer):
@@ -324,6 +331,21 @@ def _records(strands, view, to_world, steps, is_steady):
     for index in np.flatnonzero(records["drawn_points"] < strands.point_count):
         records["thickness"][index] *= strands.lengthening(int(records["drawn_points"][index]))
     return records
+
+
+def _fewer(records, count):
+    """Return `_records` with at most `count` strands, thicker in proportion; None: all strands."""
+    if count is None or (records["drawn_strands"] <= count).all():
+        return records
+    fewer = records.copy()
+    fewer["drawn_strands"] = np.minimum(records["drawn_strands"], count)
+    fewer["thickness"] *= records["drawn_strands"] / fewer["drawn_strands"]
+    return fewer
+
+
+def _on_gpu(records):
+    """Return (first record, `strand_batches.Objects` or None, block of the first record) of `_records`."""
+    return records[0], strand_batches.objects_of(records), uniforms.uniform_buffer(records[0])
 
 
 def _array(size, layer_count, texture_format):

@@ -27,6 +27,7 @@ from . import drawn_hair, drawn_surfaces, gpu_strands, hair_places, motion_vecto
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
 _WIDE = 10.0  # radius within which surfaces cast shadows, in radii of the hair
 _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
+_DRAFT_COUNTED = 20_000  # strands that are counted in a map while the GPU makes or carries hair: see `ShadowMaps.draw`
 
 
 @dataclass(frozen=True)
@@ -258,8 +259,9 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, solid, [blocker.owner for blocker in drawn.blockers])
     maps.patterns = lamps.patterns
-    # If the GPU makes strands, shadows are the same at rest as in motion.
-    maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
+    # If the GPU makes strands, shadows in motion have the same edges as at rest.
+    counted = _DRAFT_COUNTED if is_draft and are_made else None
+    maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made, counted=counted)
     if maps.is_wide and (sphere := _sphere_around_hair(drawn)) is not None:
         maps.draw_wide(lamps.record, solid, sphere, casters)
     return _with_lamps(replace(drawn, shadow_maps=maps), lamps, hair_receivers)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import ambient_visibility, strand_textures, surface_textures
+from hair_addon.blender.gpu import ambient_visibility, shadows, strand_textures, surface_textures
 from hair_addon.blender.gpu.programs import shaders
 from hair_addon.blender.gpu.strands import device_choice, strand_maker
 from hair_addon.blender.groom import bindings
@@ -195,6 +195,12 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, monkeypatch):
     before = view()
     assert asked
     prepare()
+    counted, draw = [], shadows.ShadowMaps.draw
+    monkeypatch.setattr(
+        shadows.ShadowMaps,
+        "draw",
+        lambda *given, **named: counted.append(named.get("counted")) or draw(*given, **named),
+    )
     for _ in range(3):
         comb(20)
         after = view()
@@ -202,8 +208,13 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, monkeypatch):
         assert after is not before
         before = after
     assert calls["moves"] == 0
+    assert counted[-1] == drawn_scene._DRAFT_COUNTED
     assert after.moved.turn == 3
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    view()
+    assert counted[-1] is None  # at rest maps count all strands
 
 
 def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, monkeypatch):
