@@ -3,7 +3,7 @@
 // neighbors would remove thin strands, which are in few samples of a pass. Means of blocks are compared instead: they may
 // differ as far as noise allows.
 
-#include "picture/history_blocks.glsl"
+#include "picture/history_noise.glsl"
 #include "visibility/sample_values.glsl"
 
 // Maximum weights in passes.
@@ -95,16 +95,6 @@ bool is_near_hair(ivec2 pixel)
     is_found = texelFetch(segments, place, 0).r < NO_SEGMENT;
   }
   return is_found;
-}
-
-// Whether a block, or any block beside it, has noise: elsewhere the history would not reduce flicker.
-bool has_noise(ivec2 block)
-{
-  vec4 noise = vec4(0.0);
-  for (int turn = 0; turn < 4; turn++) {
-    noise += textureLod(now_deviation, vec2(block + ivec2(turn & 1, turn >> 1)) / vec2(textureSize(now_deviation, 0)), 0.0);
-  }
-  return noise != vec4(0.0);
 }
 
 // The previous picture at a pixel; passes: its weight, 0 for none.

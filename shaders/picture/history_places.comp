@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The sample with the nearest geometry in or beside each pixel, so that silhouettes move with their objects: its index in the
-// textures of samples, row by row.
+// textures of samples, row by row; 0 where no history is used.
+
+#include "picture/history_noise.glsl"
 
 // Origin of the textures of samples in the picture. There is no hair outside of them.
 ivec2 first_place()
@@ -50,6 +52,6 @@ void main()
   if (any(greaterThanEqual(pixel, imageSize(places)))) {
     return;
   }
-  ivec2 place = place_near(pixel);
+  ivec2 place = has_noise(pixel / BLOCK_SIDE) ? place_near(pixel) : ivec2(0);
   imageStore(places, pixel, uvec4(uint(place.y * textureSize(depths, 0).x + place.x)));
 }

@@ -149,6 +149,7 @@ def places_program():
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
     info.sampler(0, "UINT_2D", "depths")
+    info.sampler(1, "FLOAT_2D", "now_deviation")
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.image(0, "R32UI", "UINT_2D", "places", qualifiers={"WRITE"})
     return shaders.compile_compute(info, "picture/history_places.comp")

@@ -4,7 +4,7 @@
 A pose only uploads the positions of vertices around roots, twelve bytes each.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import gpu
@@ -38,6 +38,7 @@ class VertexTurner:
     vertex_count: int  # of the mesh
     turned_count: int
     values: np.ndarray  # (rows, row) float32, a buffer for uploads of positions
+    turned_to: list = field(default_factory=list)  # [vertices that `turned` was computed for, or None at rest]
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
@@ -46,10 +47,14 @@ class VertexTurner:
         return [self.turned, self.rings, self.around, self.faces, *rest]
 
     def turn(self, posed: np.ndarray | None) -> gpu.types.GPUTexture:
-        """Compute `turned` for finite (V, 3) float32 vertices of the mesh; None: at rest.
+        """Compute `turned` for finite (V, 3) float32 vertices of the mesh, unless it has those of the same array.
 
-        Raises `HairError` if their number does not match.
+        posed: the vertices, which must not change later; None: at rest. Raises `HairError` if their number does not
+        match.
         """
+        if self.turned_to and self.turned_to[0] is posed:
+            return self.turned
+        self.turned_to.clear()
         now, smooth_rest = self.rest, self.rest
         if posed is not None:
             require_count("vertices", len(posed), self.vertex_count)
@@ -64,6 +69,7 @@ class VertexTurner:
         program.uniform_int("vertex_count", self.turned_count)
         gpu.compute.dispatch(program, -(-self.turned_count // _GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
+        self.turned_to.append(posed)
         return self.turned
 
 

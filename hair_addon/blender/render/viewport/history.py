@@ -161,8 +161,12 @@ class History:
         record["is_still"], record["has_lit_surfaces"] = self._is_relit, has_lit_surfaces
         if record["is_still"]:
             record["most_passes"] = _MOST_OF_STILL
+        program = picture_programs.blocks_program()
+        for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
+            blocks.fill(program, {"picture": of[0]}, weight=of[1])
+        (before_blocks, now_blocks), (picture, passes) = self._blocks, self._before.textures
         if not record["is_still"]:
-            self._find_places(record, buffer)
+            self._find_places(record, buffer, now_blocks.textures[1])
         hair_motion = surface_motion = light[0]
         motion = motion_vectors.Motion(before.places, now.places, now.places, self.size)
         if has_hair:
@@ -171,10 +175,6 @@ class History:
             motion_vectors.draw_nearest(drawn, motion, buffer, hair_motion, nearest)
         if has_surfaces:
             surface_motion = motion_vectors.draw_surfaces(drawn, motion, view, buffer)
-        program = picture_programs.blocks_program()
-        for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
-            blocks.fill(program, {"picture": of[0]}, weight=of[1])
-        (before_blocks, now_blocks), (picture, passes) = self._blocks, self._before.textures
         samplers = {
             "before": picture,
             "before_passes": passes,
@@ -192,10 +192,10 @@ class History:
         }
         self._carried.fill(picture_programs.carry_program(), samplers, {"history": record})
 
-    def _find_places(self, record, buffer):
-        """Find the sample that represents each pixel."""
+    def _find_places(self, record, buffer, deviation):
+        """Find the sample that represents each pixel; deviation: texture of the blocks of the current picture."""
         program, blocks = picture_programs.places_program(), {"history": uniforms.uniform_buffer(record)}
-        with drawing.bound(program, blocks, {"depths": buffer.nearest_depths()}):
+        with drawing.bound(program, blocks, {"depths": buffer.nearest_depths(), "now_deviation": deviation}):
             program.image("places", self._places)
             drawing.dispatch_over(program, self.size)
 

@@ -254,7 +254,9 @@ def nearest_samples(picture):
     found, detail, record = history.History(SIZE), picture._detail, uniforms.HISTORY.record()
     found._allocate()
     record["samples_per_side"] = detail.per_side
-    found._find_places(record, picture._pass)
+    noise = gpu.types.GPUTexture((1, 1), format="RGBA16F")
+    noise.clear(format="FLOAT", value=(1.0, 1.0, 1.0, 1.0))
+    found._find_places(record, picture._pass, noise)
     return NearestSamples(found._places, detail.per_side, detail.corner, history._REACH)
 
 
