@@ -73,14 +73,17 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
 
 
 def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
-    """Styles are applied before strands are deformed, and strokes and sliders on a bent surface upload no strands."""
+    """Styles are applied before strands are deformed, and strokes and sliders on a bent surface upload no strands and
+    no vertices.
+    """
     style_items.add(watched.data.vellus, curl.Settings(radius=0.02, pitch=0.1))
     bend(watched.data.surface, 0.3)
     drawn(watched)
     live_hair.write_all()
     bend(watched.data.surface, 0.5)
     drawn(watched)
-    calls = counts_of(monkeypatch)
+    calls, gathered, gather = counts_of(monkeypatch), [], vertex_turner._gathered
+    monkeypatch.setattr(vertex_turner, "_gathered", lambda *given: gathered.append(1) or gather(*given))
     for count, radius in ((60, 0.02), (0, 0.03)):
         comb(count)
         watched.data.vellus.styles[0].curl.radius = radius
@@ -88,6 +91,10 @@ def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
         shown = drawn(watched)
         assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
         np.testing.assert_allclose(shown, carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+    assert not gathered
+    bend(watched.data.surface, 0.4)
+    np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+    assert gathered == [1]
 
 
 def test_styled_hair_is_carried_too(watched, monkeypatch):
