@@ -87,6 +87,10 @@ vec3 strand_light(SeenStrand strand)
     Light light = lights.light[index];
     LampLight lamp = lamp_on_strand(light, strand.root);
     vec3 irradiance = lamp.irradiance * lamp.open * (1.0 - light.dimmed_behind * max(-dot(lamp.L, V), 0.0));
+    if (!is_visible(irradiance)) {
+      continue;
+    }
+    count_strands(light, lamp);
     // Most strands are in the shadow of the others, with no light to scatter.
     if (is_visible(irradiance * transmitted(lamp.front, view.hair_forward.rgb))) {
       // If the light misses surfaces, the normal and color of the surfaces visible from the strand.

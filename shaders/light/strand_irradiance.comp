@@ -10,6 +10,7 @@ vec4 sample_value()
   vec3 root = root_direction(strand_index);
   for (int index = 0; index < lights.count; index++) {
     LampLight lamp = lamp_on_strand(lights.light[index], root);
+    count_strands(lights.light[index], lamp);
     sent += lamp.irradiance;
     arriving += lamp.irradiance * lamp.open * transmitted(lamp.front, view.hair_forward.rgb);
   }

@@ -8,8 +8,8 @@ struct LampLight {
   vec3 L;           // towards the lamp
   vec3 irradiance;  // [W/m²] without occlusion
   float open;       // fraction that passes surfaces
-  float front;      // mean number of strands in front
-  float behind;     // mean number of strands behind
+  float front;      // mean number of strands in front, by `count_strands`
+  float behind;     // mean number of strands behind, by `count_strands`
   bool is_in_map;   // whether the position is in the lamp's shadow maps
   vec3 at;          // coordinates in these maps
   float depth;
@@ -27,8 +27,15 @@ LampLight lamp_on_strand(Light light, vec3 root)
   lamp.is_in_map = shadow_place(light, drawn_position, lamp.at, lamp.depth);
   if (lamp.is_in_map) {
     lamp.open = lit_part(lamp.at, lamp.depth, strand_bias(root, lamp.L));
+  }
+  return lamp;
+}
+
+// Finds the strands in front of and behind the strand, seen from a lamp. They only matter if surfaces let its light through.
+void count_strands(Light light, inout LampLight lamp)
+{
+  if (lamp.is_in_map) {
     float own = own_count(light, drawn_position, drawn_radius);
     lamp.front = crossed_strands(lamp.at, lamp.depth, own, lamp.behind);
   }
-  return lamp;
 }
