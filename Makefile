@@ -7,6 +7,12 @@
 # Let uv use the system's certificates, as pip does: some networks have their own.
 export UV_SYSTEM_CERTS = true
 
+# Downloads from a slow or unsteady network are waited for and repeated.
+export UV_HTTP_RETRIES = 10
+export UV_HTTP_TIMEOUT = 300
+export PIP_RETRIES = 10
+export PIP_DEFAULT_TIMEOUT = 120
+
 # Tests start many processes: without this each would compile every module again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -24,6 +30,8 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 # As many processes test as there are processors: threads of Mesa and of OpenBLAS would only wait for one another.
 test farm long: export LP_NUM_THREADS = 0
 test farm long: export OPENBLAS_NUM_THREADS = 1
+# The order of sets of words is the same in each run.
+test farm long desktop: export PYTHONHASHSEED = 0
 
 # All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except benchmarks and tests in a window, in up to four processes
@@ -69,8 +77,9 @@ lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor and, with G
 	$(python) -m ruff format --check
 	$(python) -m pyrefly check
 	.venv/bin/zizmor --offline --no-progress --quiet .github/workflows
-	if command -v go >/dev/null; then go run $(actionlint) -shellcheck= -pyflakes= .github/workflows/*.yml; \
-	  else echo "actionlint is skipped: Go is not installed"; fi
+	if GOBIN=$(CURDIR)/build go install $(actionlint); \
+	  then build/actionlint -shellcheck= -pyflakes= .github/workflows/*.yml; \
+	  else echo "actionlint is skipped: Go is not installed, or its download failed"; fi
 
 samples: $(installed) ## the .blend files of blend_samples
 	$(python) blend_samples/build_samples.py $(ARGS)

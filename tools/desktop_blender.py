@@ -140,19 +140,20 @@ def _check_installable():
 
 def _install(folder):
     print(f"Installing a desktop Blender into {folder} …", file=sys.stderr)
-    apt = ["apt-get", "install", "--quiet", "--yes", "--no-install-recommends"]
+    apt = ["apt-get", "--quiet", "--option", "Acquire::Retries=5", "--option", "DPkg::Lock::Timeout=300"]
+    install = [*apt, "install", "--yes", "--no-install-recommends"]
     environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
     try:
         if shutil.which("debootstrap") is None:
-            _call(["apt-get", "update", "--quiet"], environment)
-            _call([*apt, "debootstrap"], environment)
+            _call([*apt, "update"], environment)
+            _call([*install, "debootstrap"], environment)
         if not (folder / "usr/bin/apt-get").exists():
             _call(["debootstrap", "--variant=minbase", "sid", str(folder)], environment)
         try:
-            _call(_inside(folder, [*apt, *_PACKAGES], []), environment)
+            _call(_inside(folder, [*install, *_PACKAGES], []), environment)
         except subprocess.CalledProcessError:  # outdated package lists name removed packages
-            _call(_inside(folder, ["apt-get", "update", "--quiet"], []), environment)
-            _call(_inside(folder, [*apt, *_PACKAGES], []), environment)
+            _call(_inside(folder, [*apt, "update"], []), environment)
+            _call(_inside(folder, [*install, *_PACKAGES], []), environment)
     except subprocess.CalledProcessError as error:
         words = (error.stdout or b"").decode(errors="replace").split("\n")
         reason = next((word for word in reversed(words) if word.strip()), str(error))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ctrl-C and SIGTERM during work end it with one message, its own exit status, and only complete files."""
 
+import contextlib
 import os
 import pty
 import signal
@@ -13,6 +14,7 @@ import pytest
 from hair_addon import api
 from hair_addon.command_line import helpers, render
 from hair_addon.command_line.interruption import Interruption
+from hair_addon.core.files.file_lock import claim
 from hair_addon.core.long_work import Stopped
 from tests.support.commands import HEAD, PYTHONPATH, command, run_here
 
@@ -27,7 +29,7 @@ class Terminal:
         self.reading, self.writing = pty.openpty()
         self.reported = ""
 
-    def wait_for(self, words, seconds=60.0):
+    def wait_for(self, words, seconds=300.0):
         """Read until given words were printed."""
         end = time.monotonic() + seconds
         while words not in self.reported:
@@ -82,7 +84,7 @@ def test_long_work_ends_at_its_next_step(tmp_path):
     )
     terminal.wait_for("Spreading guides: ")
     process.send_signal(signal.SIGINT)
-    printed = process.communicate(timeout=60)[0]
+    printed = process.communicate(timeout=600)[0]
     assert (process.returncode, printed) == (130, b"")
     assert left_on(terminal) == STOPPED
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
@@ -118,16 +120,21 @@ def test_progress_is_for_terminals_only(tmp_path):
 def test_frames_of_a_killed_worker_are_rendered_by_the_other(lit, tmp_path, monkeypatch, killed):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     processes, sentence_of, real = [], render._sentence, subprocess.Popen
+    (tmp_path / "out").mkdir()
+    last = contextlib.ExitStack()  # the claim of the last frame, so that no worker ends before one is killed
+    last.enter_context(claim(tmp_path / "out" / "f_04.png"))
 
     def started(*words, **details):
         processes.append(real(*words, **details))
         if killed == 2:  # before it has a frame
             processes[-1].kill()
+            last.close()
         return processes[-1]
 
     def told(values):
         """Kill the worker when the first frame is there, whether it renders another frame or not."""
         processes[0].kill()
+        last.close()
         return sentence_of(values)
 
     monkeypatch.setattr(helpers.subprocess, "Popen", started)

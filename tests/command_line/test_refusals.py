@@ -237,7 +237,7 @@ def test_lost_output_is_a_failure(tmp_path, words, redirected):
         env=os.environ | {"PYTHONPATH": PYTHONPATH},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 1

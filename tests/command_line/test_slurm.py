@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The steps of docs/farm work on Slurm: an array job on two nodes, one of which is lost during a frame."""
 
+import contextlib
 import os
 import re
+import signal
 
 import pytest
 
+from hair_addon.core.files.file_lock import claim
 from tests.support.farms import farm, slurm
 
 pytestmark = [
@@ -13,7 +16,7 @@ pytestmark = [
     pytest.mark.skipif(not slurm.IS_INSTALLED, reason="needs Slurm and MUNGE: tools/farm-packages.txt"),
 ]
 
-LOST = slurm.NODES[1]
+KEPT, LOST = slurm.NODES
 
 
 def test_a_lost_node_costs_one_frame(lit, tmp_path):
@@ -22,17 +25,32 @@ def test_a_lost_node_costs_one_frame(lit, tmp_path):
     steps = farm.documented(
         "Slurm", {"/farm/shot.blend": shot, "1-240": f"1-{farm.COUNT}", "--array=1-8": "--array=1-2"}
     )
-    (tmp_path / "slurm").mkdir()
-    with slurm.cluster(tmp_path / "slurm") as (nodes, variables):
+    for name in ("slurm", "frames"):
+        (tmp_path / name).mkdir()
+    with contextlib.ExitStack() as claims, slurm.cluster(tmp_path / "slurm") as (nodes, variables):
+        # Frames are claimed here until a task is to render them, as one may start long before the other.
+        held = [claims.enter_context(contextlib.ExitStack()) for _frame in farm.FRAMES]
+        for one, frame in zip(held, farm.FRAMES, strict=True):
+            one.enter_context(claim(tmp_path / "frames" / frame))
         farm.shell(steps, tmp_path, PATH=path, **variables)
-        farm.wait_for(lambda: [*map(bool, told(tmp_path))] == [True, True, True], 120, pause=0.01)
-        lost, frame = farm.wait_for(lambda: found_in_mid_frame(shot), 60, pause=0.01)
+        workers = [farm.wait_for(lambda node=node: worker_on(node, shot), 300) for node in (LOST, KEPT)]
+        for number, (runs, waits) in enumerate((workers, workers[::-1]), start=1):
+            os.kill(waits, signal.SIGSTOP)
+            os.kill(runs, signal.SIGCONT)
+            held[number - 1].close()
+            farm.wait_for(lambda number=number: sum(map(bool, told(tmp_path))) == number + 1, 300)
+        os.kill(workers[1], signal.SIGSTOP)
+        os.kill(workers[0], signal.SIGCONT)
+        for one in held:
+            one.close()
+        lost, frame = farm.wait_for(lambda: found_in_mid_frame(shot), 300, pause=0.01)
         farm.kill([nodes[LOST].pid, *farm.parents_up_to(lost, "slurmstepd"), lost])
         assert not (tmp_path / "frames" / frame).exists()
+        os.kill(workers[1], signal.SIGCONT)
         # The task of the lost node waits for two minutes before it starts again: long after the others are done.
-        waiting = farm.wait_for(lambda: queued(tmp_path, variables, "--states=PENDING"), 90).split()
+        waiting = farm.wait_for(lambda: queued(tmp_path, variables, "--states=PENDING"), 300).split()
         farm.shell(f"scontrol update JobId={waiting[0]} StartTime=now", tmp_path, **variables)
-        farm.wait_for(lambda: not queued(tmp_path, variables), 120)
+        farm.wait_for(lambda: not queued(tmp_path, variables), 600)
         jobs = farm.shell("scontrol show job", tmp_path, **variables)
     assert re.findall(r"JobState=(\w+)", jobs) == ["COMPLETED"] * 3
     assert sorted(re.findall(r"Restarts=(\d)", jobs)) == ["0", "0", "1"]
@@ -49,6 +67,14 @@ def told(folder):
 def queued(folder, variables, *options):
     """Return what squeue prints about jobs that have not ended."""
     return farm.shell(f"squeue --noheader --array --format=%i {' '.join(options)}", folder, **variables)
+
+
+def worker_on(node, shot):
+    """Return the process that renders a shot on a node; None if there is none yet."""
+    for process in farm.processes_with("SLURMD_NODENAME", node):
+        if {"render", f"{shot}"} <= {*farm.arguments_of(process)[1:]}:
+            return process
+    return None
 
 
 def found_in_mid_frame(shot):

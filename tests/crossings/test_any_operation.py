@@ -32,7 +32,7 @@ def check(module, run_count, operation_count, seed, limit):
 
 @pytest.mark.parametrize("counts, seed", [((3, 80), 1), pytest.param((10, 200), 3, marks=pytest.mark.long)])
 def test_random_operations_raise_no_exception(counts, seed):
-    check("walk_operations", *counts, seed, limit=240)
+    check("walk_operations", *counts, seed, limit=1200)
 
 
 @pytest.mark.long

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of Hypothesis: no deadlines, as processors are shared. Imported by conftest.py of its tests."""
+"""Settings of Hypothesis: the same examples in each run, and no limits of time, as processors are shared.
+
+Imported by conftest.py of its tests.
+"""
 
 import hypothesis
 
-hypothesis.settings.register_profile("untimed", deadline=None)
-hypothesis.settings.load_profile("untimed")
+hypothesis.settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("repeatable")

@@ -32,7 +32,8 @@ from pathlib import Path
 from hair_addon.core.files.file_lock import claim, claim_of
 with claim(sys.argv[1]):
     print(flush=True)
-    time.sleep(2)
+    while not Path(sys.argv[3]).exists():
+        time.sleep(0.01)
     Path(sys.argv[2]).touch()
 """
 ENVIRONMENT = os.environ | {"PYTHONPATH": PYTHONPATH}
@@ -127,10 +128,13 @@ def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
 @pytest.mark.farm
 @pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
 def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
-    with start(turning, tmp_path) as process:
+    """The same command goes on after it was stopped. Its last frame is claimed here until then, so that it cannot end
+    before.
+    """
+    with claim(tmp_path / ALL[-1]), start(turning, tmp_path) as process:
         lines = [process.stdout.readline() for _ in range(2)]
         process.send_signal(asked)
-        printed, errors = process.communicate(timeout=60)
+        printed, errors = process.communicate(timeout=600)
     told = [json.loads(line) for line in [*lines, *printed.splitlines()]]
     first = [values["frame"] for values in told]
     there = {name: (tmp_path / name).stat().st_mtime_ns for name in pictures(tmp_path)}
@@ -243,7 +247,7 @@ def test_it_waits_for_frames_of_other_processes(tmp_path):
     """A frame that another process has claimed is rendered here if that process ends without it."""
     pattern = tmp_path / "f_#.png"
     left = tmp_path / "left"
-    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1)), left]
+    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1)), left, str(frames.path_of(pattern, 2))]
     is_left = {}
 
     def make(path, number):

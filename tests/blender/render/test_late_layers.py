@@ -50,6 +50,20 @@ def settle():
         late_layers.look()
 
 
+def released(monkeypatch):
+    """Return an event for which the background waits before it bakes, so that it is late on processors of any
+    speed.
+    """
+    event, real = threading.Event(), look_tables.bake
+
+    def bake(*given):
+        assert _thread() == "redraw" or event.wait(60.0)
+        return real(*given)
+
+    monkeypatch.setattr(look_tables, "bake", bake)
+    return event
+
+
 def layers_of(shading):
     return np.array(shading.samplers["n_slices"].read()) if shading.is_radial else None
 
@@ -68,14 +82,7 @@ def test_a_redraw_bakes_one_table_and_others_follow(lit, baked):
 
 
 def test_a_slider_bakes_one_table_for_each_value_and_stops_for_former_ones(lit, baked, monkeypatch):
-    look, is_released, real = lit.data.vellus.appearance, threading.Event(), look_tables.bake
-
-    def bake(*given):
-        """Bake in the background only after the slider has all its values, on processors of any speed."""
-        assert _thread() == "redraw" or is_released.wait(60.0)
-        return real(*given)
-
-    monkeypatch.setattr(look_tables, "bake", bake)
+    look, is_released = lit.data.vellus.appearance, released(monkeypatch)
     for roughness in (0.2, 0.25, 0.3, 0.35):
         look.roughness = roughness
         bpy.context.view_layer.update()
@@ -101,15 +108,17 @@ def test_viewports_show_the_first_and_last_layer_until_all_are_baked(lit, baked)
     assert late_layers.has_new() and shown(lit) is not coarse
 
 
-def test_a_range_that_grows_keeps_the_layers_so_far(lit, baked):
+def test_a_range_that_grows_keeps_the_layers_so_far(lit, baked, monkeypatch):
     """Without its last layer hair is drawn by the others, and no table is baked within the redraw."""
     shown(lit)
     settle()
     shown(lit)
     map_items.keep(lit.data.vellus, MapSettings(setting="look.radial_roughness", kind="STRAND", low=1.0, high=2.2))
     bpy.context.view_layer.update()
+    is_released = released(monkeypatch)
     grown = shown(lit)
     assert grown.is_radial and baked.count("redraw") == 1 and late_layers.parts() == (5, 6)
+    is_released.set()
     settle()
     assert late_layers.has_new() and len(baked) == 6 and len(layers_of(shown(lit))) > len(layers_of(grown))
 

@@ -75,7 +75,7 @@ def test_a_claim_ends_with_what_goes_wrong(tmp_path):
 def test_of_many_processes_one_makes_each_file(tmp_path):
     helpers = [start(SHARE, tmp_path) for _ in range(6)]
     for helper in helpers:
-        helper.communicate(timeout=60)
+        helper.communicate(timeout=600)
     assert [helper.returncode for helper in helpers] == [0] * 6
     log = (tmp_path / "log").read_text().split()
     assert sorted(log, key=int) == [str(number) for number in range(40)]

@@ -357,7 +357,7 @@ def test_edited_texels_are_refused(folder):
     assert "changed" in refused(table_exr.read_tables, folder)
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(data=st.data())
 def test_damaged_bytes_give_the_right_tables_or_a_refusal(folder, tables, data):
     path = folder / "n.exr"

@@ -54,7 +54,7 @@ def work(cache, temporary, before=()):
     """Do the work in a separate process, and return the folder from which its kernels came."""
     environment = ENVIRONMENT | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(temporary)}
     line = [*before, sys.executable, "-c", WORK]
-    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     assert "Traceback" not in done.stderr
     return Path(done.stdout.splitlines()[-1].removeprefix("cache: "))
@@ -135,7 +135,7 @@ def test_a_flipped_bit_is_noticed(cache, tmp_path):
     """No file with a flipped bit is loaded: its code could end the process or compute something else."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "WARP_CACHE_PATH": str(cache), "TMPDIR": str(tmp_path)}
     line = [sys.executable, "-c", WORK + FLIPS]
-    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(line, env=environment, capture_output=True, text=True, timeout=600, check=False)
     assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "without digest: False"), (
         done.stdout + done.stderr[-2000:]
     )

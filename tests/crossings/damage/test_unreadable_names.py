@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
     """Hair with unreadable names is drawn, edited and saved, and its layers of guides can be renamed."""
     program = [sys.executable, "-m", "tests.support.walk.walk_unreadable_names", str(tmp_path)]
-    details = {"cwd": ROOT, "env": os.environ | {"PYTHONPATH": PYTHONPATH}, "timeout": 120}
+    details = {"cwd": ROOT, "env": os.environ | {"PYTHONPATH": PYTHONPATH}, "timeout": 600}
     done = subprocess.run(program, capture_output=True, text=True, errors="replace", **details)
     assert done.returncode == 0 and "all was used" in done.stdout, done.stderr[-3000:]
     assert "Traceback" not in done.stderr + done.stdout

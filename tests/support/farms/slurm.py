@@ -31,8 +31,8 @@ ProctrackType=proctrack/linuxproc
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 ReturnToService=2
-SlurmdTimeout=3
-MessageTimeout=2
+SlurmdTimeout=6
+MessageTimeout=5
 SchedulerParameters=sched_interval=1,bf_interval=1,batch_sched_delay=0
 NodeName=farm[1-2] NodeHostname={host} NodeAddr=127.0.0.1 Port=[{ports[1]}-{ports[2]}] CPUs=1 RealMemory=500
 PartitionName=farm Nodes=ALL Default=YES State=UP MaxTime=INFINITE
@@ -58,10 +58,10 @@ def cluster(folder):
         daemons.callback(_end_all, variables)
         start = _starter(daemons, folder, variables)
         start("munge", "munged", "--foreground", "--force", *_munge_files(folder / "munge"))
-        farm.wait_for((folder / "munge" / "socket").exists, 10)
+        farm.wait_for((folder / "munge" / "socket").exists, 60)
         start("controller", "slurmctld", "-D", "-f", configuration)
         nodes = {name: start(name, "slurmd", "-D", "-f", configuration, "-N", name) for name in NODES}
-        farm.wait_for(lambda: _idle_count(variables) == len(NODES), 30)
+        farm.wait_for(lambda: _idle_count(variables) == len(NODES), 120)
         yield nodes, variables
 
 

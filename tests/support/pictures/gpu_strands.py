@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair whose strands the GPU generates and deforms, as in a window on a graphics card: fixtures and drawn points."""
 
+import math
+
 import bpy
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ import pytest
 from hair_addon.blender.gpu.strands import device_choice
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.host import running
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import invalidation, live_hair, moving_surfaces
 from hair_addon.blender.render import hair_cache
 from tests.support.pictures import drawn_strands
 from tests.support.reading import points, write_points
@@ -18,8 +20,9 @@ CLOSE = 1e-5  # [m] of strands of half a meter on a ball of one
 
 @pytest.fixture
 def window(monkeypatch):
-    """Simulate a window on a graphics card, where hair is written after an interaction."""
+    """Simulate a window on a graphics card, where hair is written after an interaction, on processors of any speed."""
     monkeypatch.setattr(running, "has_window", lambda: True)
+    monkeypatch.setattr(moving_surfaces, "_TOGETHER", math.inf)
     monkeypatch.setattr(device_choice, "times", lambda: (0.0, 1.0))
     yield
     live_hair.cancel_writing()
