@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         media,
         row_sums,
         seen_rays,
+        start_density,
         start_places,
         strand_cells,
         strand_grid,

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ...kernels import kernel_cache
 from ...kernels.checks import require_count, require_indices
 from ...long_work import Progress, no_progress, part_of
-from . import grid_walk, light_texels, start_places, strand_nodes, view, voxel_means, voxel_sums
+from . import grid_walk, light_texels, start_density, start_places, strand_nodes, view, voxel_means, voxel_sums
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, on_axis, walk
 from .lamp_light import Event, light_at_hit, light_at_once, light_by_share
@@ -136,6 +137,12 @@ def _even(
     out_even[sample] = even_return(fibre_of(medium, segments[sample]), -view.direction_at(seen_in, x, y))
 
 
+@wp.kernel
+def _weigh(weights: wp.array[float], power: float, values: wp.array[wp.vec3]):
+    path = wp.tid()
+    values[path] = wp.pow(weights[path], power) * values[path]
+
+
 def gather(
     grid: StrandGrid,
     surroundings: Surroundings,
@@ -206,6 +213,8 @@ class PathSums:
                 self._fade(weight)
             if even is not None:
                 self._sums.add(seen.places, seen.segments, seen.drawn, even, 6)
+                different = {id(of_hair): of_hair for of_hair in self._sums.of_systems()}
+                start_density.set_levels(self._levels, list(different.values()))
         self._seen = seen
 
     def _start_in(self, seen):
@@ -213,7 +222,8 @@ class PathSums:
         even = _even_there(self._medium, seen.view, seen.segments, seen.places)
         faint = _FAINT * voxel_sums.brightness(seen.drawn)[0] / len(seen.segments)
         self._sources = sources_of(self._surroundings, faint)
-        self._voxels, self._voxel_count = start_places.voxels_of(self._medium, seen.places)
+        self._levels, self._voxel_count = start_places.voxels_of(self._medium, seen.places)
+        self._found_squares = np.zeros(2)  # of the light of paths, and of the same with even density
         return even
 
     def follow(self, count: int, seed: int, progress: Progress = no_progress) -> None:
@@ -224,16 +234,30 @@ class PathSums:
         if self._seen is None or not len(self._seen.segments):
             return
         with wp.ScopedDevice(self.grid.device):
-            starts = start_places.of_seen(self._in_sight, self._seen, self._voxels, count, seed)
+            starts = start_places.of_seen(self._in_sight, self._seen, self._levels, count, seed)
             traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
             positions, light, even, *parts = traced
+            if self._parts is not None:
+                # Sums of nodes are not added to others, so paths need no weights, and more paths are known better.
+                self._nodes.add(starts.segments, positions, parts[0], even)
+            # Squares of light with half of the weight's power are those that paths of even density would have.
+            _multiply((light,), starts.weights, 0.5)
+            even_squares = voxel_sums.brightness(light)[1]
+            _multiply((light,), starts.weights, 0.5)
+            _multiply((even, *parts), starts.weights, 1.0)
             self._sums.add(positions, starts.segments, light, even, 0)
             if self._parts is not None:
                 for index, part in enumerate(parts):
                     self._parts.add(positions, starts.segments, part, even, 6 * index)
-                self._nodes.add(starts.segments, positions, parts[0], even)
             total, squares = voxel_sums.brightness(light)
+            self._compare_density(squares, even_squares)
         self._total, self._squares, self.taken = self._total + total, self._squares + squares, self.taken + len(light)
+
+    def _compare_density(self, squares, even_squares):
+        """Start further paths with even density unless other density reduces the squares of their light enough."""
+        self._found_squares += np.array([squares, even_squares])
+        if self._found_squares[0] > start_density.WORTH * self._found_squares[1]:
+            start_density.set_even(self._levels)
 
     @property
     def wanted(self) -> float:
@@ -337,6 +361,11 @@ def _traced(medium, sources, seen_in, starts, progress):
         launch(_gather, len(rows[0]), [medium, sources, seen_here, *rows], device)
         progress(FOLLOWING, some.stop / count)
     return found
+
+
+def _multiply(values, weights, power):
+    for of_paths in values:
+        kernel_cache.launch(_weigh, len(weights), [weights, power, of_paths], [], weights.device)
 
 
 def _standard_error(total, squares, count):

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Start places of paths, which stay on their strands from frame to frame, and the random numbers of these paths.
 
-The number of tried places on a segment is proportional to its area in the picture; visible places become starts. A path
-is identified by its segment and its index there, which determine all its random numbers, and its directions are sampled
-in the frame of the strand or surface that it hits. When a camera or hair moves a little, the same
-paths therefore begin at the same places, and their light changes little.
+The number of tried places on a segment is proportional to its area in the picture and to `start_density`; visible
+places become starts. A path is identified by its segment and its index there, which determine all its random numbers,
+and its directions are sampled in the frame of the strand or surface that it hits. When a camera or hair moves a little,
+the same paths therefore begin at the same places, and their light changes little.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ from ...kernels.checks import require_count
 from .grid_walk import STRAND, Hit, Medium, is_blocked, place_on, walk
 from .media import launch
 from .seen_rays import Seen
+from .start_density import EVEN, density_of, level_at
 from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -33,6 +34,7 @@ class Starts:
 
     segments: wp.array[int]  # (N,) of a grid
     keys: wp.array[int]  # (N,) random states
+    weights: wp.array[float]  # (N,) reciprocal densities
 
 
 @wp.func
@@ -67,51 +69,49 @@ def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Hit, direction: wp.v
     return medium.strands[hit.index] == own and wp.length(hit.position - place.position) <= radius
 
 
-@wp.func
-def _is_near_seen(medium: Medium, is_seen: wp.array3d[wp.uint8], start: wp.vec3, end: wp.vec3):
-    """Whether a segment is in any of the voxels of `voxels_of`."""
-    places = 2 + wp.clamp(int(2.0 * wp.length(end - start) / medium.voxel), 0, _MOST_PLACES)
-    found = int(0)
-    for step in range(places):
-        place = start + (end - start) * (float(step) / float(places - 1))
-        at = (place - medium.corner) / medium.voxel
-        x = wp.clamp(int(at[0]), 0, is_seen.shape[2] - 1)
-        y = wp.clamp(int(at[1]), 0, is_seen.shape[1] - 1)
-        z = wp.clamp(int(at[2]), 0, is_seen.shape[0] - 1)
-        found += int(is_seen[z, y, x])
-    return found > 0
-
-
 @wp.kernel
 def _count(
     medium: Medium,
     view: ViewOnDevice,
-    is_seen: wp.array3d[wp.uint8],
+    levels: wp.array3d[wp.uint8],
     density: float,
     most: int,
     seed: int,
     out_count: wp.array[int],
     first: int,
 ):
-    """Count the places to try on each segment: `density` per unit of area in the picture, at most `most`."""
+    """Count the places to try on each segment: at most `most`, and `density` per unit of area in the picture, times the
+    density of the segment's level.
+    """
     segment = first + wp.tid()
     start = medium.points[segment]
     end = medium.points[segment + 1]
     count = int(0)
-    if medium.strands[segment] == medium.strands[segment + 1] and _is_near_seen(medium, is_seen, start, end):
+    level = level_at(levels, medium.corner, medium.voxel, start, end, _MOST_PLACES)
+    if level > 0 and medium.strands[segment] == medium.strands[segment + 1]:
         middle = 0.5 * (start + end)
         x, y, area = seen_at(view, middle)
         direction = direction_at(view, x, y)
         if depth_at(view, middle, direction) <= 0.0:
             area = 0.0  # unbounded in front of the near plane
         width = medium.radii[segment] + medium.radii[segment + 1]
-        wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
+        wanted = wp.length(wp.cross(end - start, direction)) * width * area * density * density_of(level)
         if wanted < float(most):
             state = wp.rand_init(seed, segment)
             count = int(wanted + wp.randf(state))
         else:
             count = most
     out_count[segment] = count
+
+
+@wp.kernel
+def _weigh(medium: Medium, levels: wp.array3d[wp.uint8], segments: wp.array[int], out_weights: wp.array[float]):
+    path = wp.tid()
+    segment = segments[path]
+    start = medium.points[segment]
+    end = medium.points[segment + 1]
+    level = level_at(levels, medium.corner, medium.voxel, start, end, _MOST_PLACES)
+    out_weights[path] = 1.0 / density_of(level)
 
 
 @wp.func
@@ -141,11 +141,12 @@ def _spread(holds: wp.array3d[wp.uint8], out_touches: wp.array3d[wp.uint8]):
         for layer in range(wp.max(z - 1, 0), wp.min(z + 2, holds.shape[0])):
             for row in range(wp.max(y - 1, 0), wp.min(y + 2, holds.shape[1])):
                 for column in range(wp.max(x - 1, 0), wp.min(x + 2, holds.shape[2])):
-                    out_touches[layer, row, column] = wp.uint8(1)
+                    out_touches[layer, row, column] = wp.uint8(EVEN)
 
 
 def voxels_of(medium: Medium, places: wp.array[wp.vec3]) -> tuple[wp.array3d[wp.uint8], int]:
-    """Return ((Z, Y, X): one in voxels that contain places (N,) and in their neighbors; number of voxels with places).
+    """Return ((Z, Y, X): level of even density in voxels that contain places (N,) and in their neighbors; number of
+    voxels with places).
 
     Samples miss thin hair, which may be visible beside them.
     """
@@ -188,11 +189,11 @@ def _total(counts):
     return int(totals.numpy().sum())
 
 
-def _tries(medium, view, is_seen, density, count, seed, device):
+def _tries(medium, view, levels, density, count, seed, device):
     """Return (segments,) the number of tried places of each, reduced if there would be too many for `count` paths."""
     counts, most = wp.zeros(max(len(medium.points) - 1, 0), dtype=int), count
     while True:
-        launch(_count, len(counts), [medium, view, is_seen, density, most, seed, counts], device)
+        launch(_count, len(counts), [medium, view, levels, density, most, seed, counts], device)
         tries = _total(counts)
         if tries <= _MOST_TRIES * count:
             return counts
@@ -242,21 +243,25 @@ def _keep(
         out_keys[ends[place] - 1] = keys[place]
 
 
-def of_seen(medium: Medium, seen: Seen, voxels: wp.array3d[wp.uint8], count: int, seed: int) -> Starts:
-    """Return about `count` `Starts`, on the device of a medium; voxels: with visible hair, from `voxels_of`."""
+def of_seen(medium: Medium, seen: Seen, levels: wp.array3d[wp.uint8], count: int, seed: int) -> Starts:
+    """Return about `count` `Starts`, on the device of a medium.
+
+    levels: of voxels with visible hair, from `voxels_of` or `start_density.set_levels`.
+    """
     device, seen_in = medium.points.device, on_device(seen.view)
-    for side, wanted in zip(voxels.shape[::-1], medium.shape, strict=True):
+    for side, wanted in zip(levels.shape[::-1], medium.shape, strict=True):
         require_count("voxels", side, int(wanted))
     with wp.ScopedDevice(device):
-        counts = _tries(medium, seen_in, voxels, count / (len(seen.segments) * seen.area), count, seed, device)
+        counts = _tries(medium, seen_in, levels, count / (len(seen.segments) * seen.area), count, seed, device)
         ends, tries = running_sums.ends_of(counts)
         segments, keys, in_sight = (wp.zeros(tries, dtype=int) for _ in range(3))
         launch(_list, len(counts), [counts, ends, _product(seed + 1), segments, keys], device)
         launch(_see, tries, [medium, seen_in, segments, keys, in_sight], device)
         ends, found = running_sums.ends_of(in_sight)
-        starts = Starts(wp.empty(found, dtype=int), wp.empty(found, dtype=int))
+        starts = Starts(wp.empty(found, dtype=int), wp.empty(found, dtype=int), wp.empty(found, dtype=float))
         given = [segments, keys, in_sight, ends]
         kernel_cache.launch(_keep, tries, given, [starts.segments, starts.keys], device)
+        kernel_cache.launch(_weigh, found, [medium, levels, starts.segments], [starts.weights], device)
         return starts
 
 
