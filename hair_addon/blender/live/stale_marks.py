@@ -191,7 +191,16 @@ def _parts_by(hair, changed, transformed):
         return True
     # Each step of a stroke would read the guides, so they are read only if they have a region attribute or ties.
     guides, names = state.guide_curves, (text_of(state.hair, "region_attribute"), gathered_groups.TIE)
-    return guides is not None and guides in changed and any(name in guides.attributes for name in names)
+    if guides is None or guides not in changed:
+        return False
+    return any(name in guides.attributes for name in names) or _was_parted_by_ties_alone(hair)
+
+
+def _was_parted_by_ties_alone(hair):
+    settings, bound = hair.vellus.hair, bindings.of(hair)
+    others = text_of(settings, "region_group"), text_of(settings, "part_lines")
+    key = hair.vellus.parting_key if bound is None else bound.parting_key
+    return key != "" and text_of(settings, "region_attribute") == gathered_groups.NAME and not any(others)
 
 
 def images_of(target):

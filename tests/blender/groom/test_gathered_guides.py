@@ -164,6 +164,21 @@ def test_hair_in_regions_of_its_surface_follows_new_ties(guides):
         np.testing.assert_allclose(points(hair), anew.points, atol=1e-5)
 
 
+def test_hair_is_not_parted_by_ties_that_a_script_removes(guides):
+    hair = bpy.data.objects["Hair"]
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    gather(guides)
+    parted = points(hair)
+    for name in [name for name in guides.data.attributes.keys() if name.startswith(gathered_groups.NAME)]:
+        guides.data.attributes.remove(guides.data.attributes[name])
+    guides.data.update_tag()
+    bpy.context.view_layer.update()
+    anew = pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_allclose(points(hair), anew.points, atol=1e-5)
+    assert np.abs(points(hair) - parted).max() > 0.1 and hair.data.vellus.parting_key == ""
+
+
 def test_a_line_through_the_surface_keeps_guides_outside(guides):
     add_line(lines=((LINE[0], (0.0, 0.7, 0.95), (0.0, -0.5, -0.5)),))
     before = points(guides)
