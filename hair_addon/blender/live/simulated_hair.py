@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import scene
+from ..data import scene, usable_surfaces
 from ..data.simulation import wet_guides
 from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside
@@ -48,14 +48,15 @@ played_cache = Cache()  # session_uid of guide Curves → _Played
 def follow_frame(blender_scene, depsgraph):
     """Move all simulated guides and their hair to the scene's time.
 
-    For a viewport the next frame is simulated if it is not baked; a render only shows existing frames.
+    For a viewport the next frame is simulated if it is not baked; a render only shows existing frames. Guides on
+    surfaces of other scenes stay at the times of these scenes.
     """
     if running.job() is not None or guide_baking.is_baking():
         return
     is_played = scene_time.is_shown(depsgraph) and running.has_window()
     time = scene_time.time_of(blender_scene)
     shown_in = depsgraph if scene_time.is_shown(depsgraph) else scene.present_depsgraph()
-    for guides in frame_folders.simulating():
+    for guides in _of_scene(frame_folders.simulating(), depsgraph):
         try:
             points = _points_at(guides, time, (blender_scene, depsgraph))
             if points is None and is_played and time == int(time):
@@ -67,6 +68,10 @@ def follow_frame(blender_scene, depsgraph):
             guides.vellus.dynamics_status = str(error)
         else:
             _update_status(guides, blender_scene, points, time)
+
+
+def _of_scene(simulating, depsgraph):
+    return [one for one in simulating if one.surface is None or usable_surfaces.is_in(one.surface, depsgraph)]
 
 
 def _update_status(guides, blender_scene, points, time):
@@ -112,8 +117,10 @@ def note_combed(combed, blender_scene):
 
 
 def show_known(simulating, blender_scene, depsgraph):
-    """Show simulated guides at their known points after loading, copying, undo or redo, which show them as combed."""
-    for guides in simulating:
+    """Show simulated guides of a scene at their known points after loading, copying, undo or redo, which show them as
+    combed.
+    """
+    for guides in _of_scene(simulating, depsgraph):
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
             _note_state(guides, blender_scene)

@@ -218,3 +218,14 @@ def test_skipped_frames_are_not_simulated(swung):
         sentence, values = dynamics_state.state_of(guides.data)
         assert "skipped" in sentence and values == {"frame": 3}
     assert not np.array_equal(played(guides, 4, 4), third)
+
+
+def test_frames_of_other_scenes_move_no_guides(swung):
+    guides, _hair = swung
+    expected = [played(guides, last=6), played(guides, 7, 7)]
+    other = bpy.data.scenes.new("Other")
+    shown = played(guides, last=6)
+    for frame in (3, 7):
+        other.frame_set(frame)
+        np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), shown)
+    np.testing.assert_array_equal([shown, played(guides, 7, 7)], expected)
