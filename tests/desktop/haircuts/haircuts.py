@@ -269,6 +269,7 @@ CORNROWS = (
     lines("vellus.draw_tie", *TO_NAPE, use_stroke_endpoints=False),
     select("Head"),
     press("vellus.gather_guides", shape="CORNROWS", tie_radius=0.0065),
+    fields("hair", point_count=97),
     *FLYAWAYS,
     press("vellus.apply_preset", preset="DARK_BROWN"),
 )
