@@ -62,7 +62,7 @@ def walk(extension, bare_python, tmp_path_factory):
 
     def run(verb):
         command = [bare_python, "-I", WALK, verb, extension, tmp_path_factory.mktemp("walk")]
-        done = subprocess.run(command, cwd=home, env=environment, capture_output=True, text=True, timeout=300)
+        done = subprocess.run(command, cwd=home, env=environment, capture_output=True, text=True, timeout=1200)
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
         return json.loads(done.stdout.splitlines()[-1])
 

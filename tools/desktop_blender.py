@@ -50,7 +50,7 @@ class DesktopBlender:
     folder: Path | None = None
 
     def run(
-        self, script, arguments=(), *, backend="opengl", profile, folders=(), log=None, limit=300, size=WINDOW_SIZE
+        self, script, arguments=(), *, backend="opengl", profile, folders=(), log=None, limit=1200, size=WINDOW_SIZE
     ):
         """Run a script in a window; returns Blender's exit status, 124 where it ran past `limit` [s].
 
@@ -80,7 +80,7 @@ class DesktopBlender:
             if output:
                 output.close()
 
-    def command(self, *arguments, profile, folders=(), limit=300):
+    def command(self, *arguments, profile, folders=(), limit=1200):
         """Blender without a window, as `blender ARGUMENT …`; returns the finished process. Others as for `run`."""
         command = ["env", *self._environment(profile), "timeout", str(limit), self.executable, *arguments]
         if self.folder is not None:

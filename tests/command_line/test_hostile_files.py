@@ -250,7 +250,7 @@ def run_mounted(mounting, words, folder):
     script = f'{mounting}; cd "$0"; "$@"; status=$?; ls -A "$0" > "$0.left"; exit $status'
     environment = os.environ | {"PYTHONPATH": PYTHONPATH}
     words = ["unshare", "--mount", "sh", "-c", script, str(folder), *command(*words)]
-    done = subprocess.run(words, capture_output=True, text=True, env=environment, timeout=300)
+    done = subprocess.run(words, capture_output=True, text=True, env=environment, timeout=1200)
     return done, folder.with_name(folder.name + ".left").read_text().split()
 
 

@@ -169,13 +169,13 @@ def copy():
     """Copy the scene with its objects, and delete the scene of the copy's hair."""
     with in_viewport():
         bpy.ops.scene.new(type="FULL_COPY")
-    yield from wait_for(lambda: scene().vellus.hair_scene.background_set == scene(), 10.0)
+    yield from wait_for(lambda: scene().vellus.hair_scene.background_set == scene())
     owner = scene().vellus.hair_scene.background_set
     facts["copy"] = {"has its own": owner == scene(), "scenes": len(bpy.data.scenes)}
     yield from render("copy")
     facts["copy"]["picture"] = differ("copy", "on")
     bpy.data.scenes.remove(scene().vellus.hair_scene)
-    yield from wait_for(lambda: is_on() == [False, False], 10.0)
+    yield from wait_for(lambda: is_on() == [False, False])
     facts["copy"]["without its scene"] = is_on()
     bpy.data.scenes.remove(scene())
     yield
@@ -188,7 +188,7 @@ def disable():
     bpy.ops.preferences.addon_disable(module=MODULE)
     yield from render("disabled")
     bpy.ops.preferences.addon_enable(module=MODULE)
-    yield from wait_for(lambda: is_on() == [True, True], 10.0)
+    yield from wait_for(lambda: is_on() == [True, True])
     facts["enabled"] = is_on()
     yield from toggle()
     yield from render("off")
@@ -219,7 +219,7 @@ def export():
     bpy.context.view_layer.objects.active = keyed
     with in_viewport():
         bpy.ops.vellus.export_groom("INVOKE_DEFAULT", animation="ALL")
-    yield from wait_for(lambda: browsers() and browsers()[0][1].spaces.active.params is not None, 10.0)
+    yield from wait_for(lambda: browsers() and browsers()[0][1].spaces.active.params is not None)
     params = browsers()[0][1].spaces.active.params
     params.directory, params.filename = str(OUT).encode(), "groom.abc"
     for _time in range(5):  # a browser that is not drawn yet takes no keys

@@ -31,7 +31,7 @@ def _once(tmp_path_factory, name, make):
     with open(folder / f"{name}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # until it is closed
         if not made.exists():
-            (folder / name).mkdir()
+            (folder / name).mkdir(exist_ok=True)  # it is there if another process has failed
             made.write_text(str(make(folder / name)))
     return Path(made.read_text())
 
@@ -55,7 +55,7 @@ def new_profile(desktop, extension, tmp_path_factory):
 
     def set_up(folder):
         log = folder.with_suffix(".log")
-        status = desktop.run(SET_UP, [extension], profile=folder, log=log, limit=300, size=(640, 400))
+        status = desktop.run(SET_UP, [extension], profile=folder, log=log, size=(640, 400))
         assert status == 0, log.read_text(errors="replace")[-4000:]
         return folder
 

@@ -121,9 +121,8 @@ def use(name):
         take_picture(OUT / "menu.png", redraws=2)
     count = len(bpy.context.window_manager.operators)
     yield from key("RET")
-    yield from wait_for(
-        lambda: len(bpy.context.window_manager.operators) > count, 60.0
-    )  # kernels may be compiled first
+    # Kernels may be compiled first.
+    yield from wait_for(lambda: len(bpy.context.window_manager.operators) > count)
     yield
     done = facts["tools"][name] = {"ran": bpy.context.window_manager.operators[-1].bl_idname}
     done["mode"], first = bpy.context.mode, guides()

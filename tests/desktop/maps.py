@@ -135,7 +135,7 @@ def press_the_button():
     """Click the button of the setting: a map appears, in a popover, from which its kind is chosen."""
     panel = sidebar()
     yield from click(panel.x + panel.width - BUTTON[0], panel.y + panel.height - BUTTON[1])
-    yield from wait_for(lambda: item() is not None, 10.0)
+    yield from wait_for(lambda: item() is not None)
     facts["clicked"] = item() is not None
     take_picture(OUT / "popover.png")
     yield from key("ESC")
@@ -237,7 +237,7 @@ def paint_a_coat():
     middle = places(np.zeros((1, 3)))[0]
     yield from drag(middle - np.array([40, 0]), middle + np.array([40, 0]), steps=6)
     yield from wait(0.5)
-    yield from wait_for(lambda: np.array_equal(*looks()), 10.0)  # written after a pause
+    yield from wait_for(lambda: np.array_equal(*looks()))  # written after a pause
     painted, stored = looks()
     take_picture(OUT / "coat.png")
     facts["red"] = int(((painted[:, 0] < before[:, 0]) & (painted[:, 1] > before[:, 1])).sum())
@@ -245,7 +245,7 @@ def paint_a_coat():
     facts["is stored"] = bool(np.array_equal(painted, stored))
     for name, wanted, is_redo in (("undone", before, False), ("redone", painted, True)):
         yield from key("Z", ctrl=True, shift=is_redo)
-        yield from wait_for(lambda wanted=wanted: are_looks(wanted), 10.0)
+        yield from wait_for(lambda wanted=wanted: are_looks(wanted))
         facts[f"coat {name}"] = are_looks(wanted)
 
 

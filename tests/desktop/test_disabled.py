@@ -15,7 +15,7 @@ SAID = "Vellus: Blender renders: Vellus is disabled when the render has ended."
 @pytest.fixture(scope="module")
 def walk(desktop, extension, new_profile):
     """Return the `Walk` with one backend, as only Blender's threads matter."""
-    return walks.take(desktop, "disabled", extension, new_profile(), "opengl", size=(640, 400), limit=240)
+    return walks.take(desktop, "disabled", extension, new_profile(), "opengl", size=(640, 400))
 
 
 def pixels(path):

@@ -44,7 +44,6 @@ def walk_with(backend, desktop, extension, profile):
         more=[packages],
         folder=backend,
         folders=[packages],
-        limit=600,
         size=SIZE,
     )
 

@@ -12,6 +12,9 @@ import numpy as np
 # Seconds after which a window that was drawn is seen.
 _SHOWN = 0.5
 
+# Rounds of Blender's events in which timers of the add-on that start each other have run, on processors of any speed.
+_ROUNDS = 5
+
 MODULE = "bl_ext.user_default.vellus"
 
 _HEAD = Path(__file__).resolve().parents[2] / "blend_samples" / "head.obj"
@@ -125,13 +128,14 @@ def mask_scalp(head):
 
 
 def wait(seconds):
-    """Yield to Blender for some time."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    """Yield to Blender for some time, and for some rounds of events, timers and redraws, which may take longer."""
+    end, rounds = time.monotonic() + seconds, 0
+    while time.monotonic() < end or rounds < _ROUNDS:
+        rounds += 1
         yield
 
 
-def wait_for(happened, seconds=60.0):
+def wait_for(happened, seconds=180.0):
     """Yield to Blender until a condition is true or a time has passed."""
     end = time.monotonic() + seconds
     while not happened() and time.monotonic() < end:

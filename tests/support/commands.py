@@ -52,7 +52,7 @@ def command(*arguments):
 
 def run(*arguments, **details):
     """Run a command in a separate process."""
-    details = {"cwd": ROOT, "timeout": 300, "env": os.environ | {"PYTHONPATH": PYTHONPATH}} | details
+    details = {"cwd": ROOT, "timeout": 1200, "env": os.environ | {"PYTHONPATH": PYTHONPATH}} | details
     done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, **details)
     return Ended(done.returncode, done.stdout, done.stderr)
 

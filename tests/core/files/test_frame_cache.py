@@ -183,7 +183,7 @@ for _ in range(count):
 def check_killed(folder, rounds, kills):
     for seed in range(rounds):
         line = [sys.executable, "-c", KILLED, str(folder), str(kills), str(seed)]
-        subprocess.run(line, env=ENVIRONMENT, cwd=ROOT, check=True, timeout=300)
+        subprocess.run(line, env=ENVIRONMENT, cwd=ROOT, check=True, timeout=1200)
         check_whole(folder)
     bake(folder, range(-2, 4))
     assert check_whole(folder)[0] == list(range(-2, 4))

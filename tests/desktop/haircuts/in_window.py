@@ -74,7 +74,7 @@ def _save(name):
 def _count_changed(count):
     """Change the number of strands, and yield until this and all earlier changes are complete."""
     hands.hair().data.vellus.hair.strand_count = count
-    yield from wait_for(lambda: len(hands.hair().data.curves) == count, 90.0)
+    yield from wait_for(lambda: len(hands.hair().data.curves) == count)
     yield from wait(0.3)
 
 
@@ -107,7 +107,7 @@ def remesh():
     yield from hands.select("Hair Guides")()
     count = 2 * len(hands.guides().data.curves)
     yield from hands.fields("guides", guide_count=count)()
-    yield from wait_for(lambda: len(hands.guides().data.curves) == count, 60.0)
+    yield from wait_for(lambda: len(hands.guides().data.curves) == count)
     yield from wait(1.0)
     after = yield from _strands()
     apart, neighbors = distances(after, before), distances(before, before, nearest=2)

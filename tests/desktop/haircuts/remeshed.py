@@ -74,7 +74,7 @@ def comb():
     facts["groups"] = [group.name for group in bpy.data.objects["Head"].vertex_groups]
     yield from hands.select("Hair Guides")()
     yield from hands.fields("guides", guide_count=2 * COUNT)()
-    yield from wait_for(lambda: len(hands.guides().data.curves) == 2 * COUNT, 30.0)
+    yield from wait_for(lambda: len(hands.guides().data.curves) == 2 * COUNT)
     yield from wait(1.0)
     after = guides()
     facts["guides"], facts["status"] = len(after), [hands.hair().data.vellus.status, hands.guides().data.vellus.status]

@@ -58,7 +58,7 @@ def test_haircuts_stay_on_another_mesh_with_twice_the_guides(name, bare, desktop
         more=(bare(name), 300, 4000),
         folder=f"haircut_{name}",
         size=(560, 440),
-        limit=900,
+        limit=1800,
     )
     walk.assert_done()
     facts = walk.facts[name]

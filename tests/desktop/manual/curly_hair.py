@@ -106,7 +106,7 @@ def add_style(offer):
     for _entry in range(1 + list(offers()).index(offer)):
         yield from key("DOWN_ARROW", place)
     yield from key("RET", place)
-    yield from wait_for(lambda: len(state.styles) > count, 10.0)
+    yield from wait_for(lambda: len(state.styles) > count)
     yield from wait(1.0)
 
 

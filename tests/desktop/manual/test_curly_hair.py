@@ -18,9 +18,7 @@ PARTS = {"opengl": ("cut", "curl_and_beyond"), "vulkan": ("cut", "curl")}
 def walk(request, desktop, extension, new_profile):
     """Return the `Walk` with one backend."""
     parts = PARTS[request.param]
-    return walks.take(
-        desktop, "manual/curly_hair", extension, new_profile(), request.param, parts=parts, limit=600, size=SIZE
-    )
+    return walks.take(desktop, "manual/curly_hair", extension, new_profile(), request.param, parts=parts, size=SIZE)
 
 
 def test_it_comes_to_its_end(walk):

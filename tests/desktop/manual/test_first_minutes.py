@@ -14,7 +14,7 @@ SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time f
 def walk(request, desktop, extension, tmp_path_factory):
     """Return the `Walk` with one backend."""
     profile = tmp_path_factory.mktemp("profile")
-    return walks.take(desktop, "manual/first_minutes", extension, profile, request.param, limit=600, size=SIZE)
+    return walks.take(desktop, "manual/first_minutes", extension, profile, request.param, size=SIZE)
 
 
 def test_it_comes_to_its_end(walk):

@@ -26,7 +26,7 @@ def taken(desktop, extension, new_profile):
             backend,
             parts=models,
             more=map(str, MORE),
-            limit=900,
+            limit=1800,
             size=size,
         )
         for backend in desktop_blender.BACKENDS

@@ -89,7 +89,7 @@ def played():
     """Play the timeline: Blender leaves out the strands, and the window shows them deformed."""
     with in_viewport():
         bpy.ops.screen.animation_play()
-    yield from wait_for(lambda: bpy.context.scene.frame_current >= LAST, 120.0)
+    yield from wait_for(lambda: bpy.context.scene.frame_current >= LAST)
     facts["playing"] = state()
     take_picture(OUT / "playing.png", redraws=1)
     facts["playing_light"] = offscreen_light(addon())
@@ -114,7 +114,7 @@ def played_beside_workbench():
     with in_viewport():
         bpy.ops.screen.animation_play()
     at = bpy.context.scene.frame_current
-    yield from wait_for(lambda: bpy.context.scene.frame_current >= at + 2, 120.0)
+    yield from wait_for(lambda: bpy.context.scene.frame_current >= at + 2)
     facts["beside Workbench"] = state()
     with in_viewport():
         bpy.ops.screen.animation_cancel(restore_frame=False)
@@ -130,7 +130,7 @@ def dragged():
         slider().value = 0.1 * step
         yield
     facts["dragged"] = state()
-    yield from wait_for(lambda: not state()[0], 20.0)
+    yield from wait_for(lambda: not state()[0])
     facts["rested"] = state()
     take_picture(OUT / "rested.png", redraws=1)
 
@@ -140,7 +140,7 @@ def previewed():
     bpy.context.scene.render.engine = "BLENDER_EEVEE"  # Workbench has no Material Preview
     space = viewport()[0].spaces.active
     space.shading.type = "MATERIAL"
-    yield from wait_for(lambda: state()[0], 20.0)
+    yield from wait_for(lambda: state()[0])
     facts["previewed"] = state()
     yield from wait(1.0)
     take_picture(OUT / "previewed.png", redraws=1)
@@ -150,7 +150,7 @@ def previewed():
     yield from wait(1.0)
     facts["view"] = list(space.region_3d.view_location)
     space.shading.type = "SOLID"
-    yield from wait_for(lambda: not state()[0], 20.0)
+    yield from wait_for(lambda: not state()[0])
     facts["in Solid again"] = state()
 
 

@@ -134,7 +134,7 @@ def played():
     combed, before = strands(), light()
     bpy.app.handlers.frame_change_post.append(look)
     play()
-    yield from wait_for(lambda: scene().frame_current >= LAST, 120.0)
+    yield from wait_for(lambda: scene().frame_current >= LAST)
     stop()
     bpy.app.handlers.frame_change_post.remove(look)
     last = scene().frame_current
@@ -209,9 +209,9 @@ def stopped():
     before = len(frames())
     with in_viewport():
         bpy.ops.vellus.bake_dynamics("INVOKE_DEFAULT")
-    yield from wait_for(lambda: len(frames()) > before + 4, 60.0)
+    yield from wait_for(lambda: len(frames()) > before + 4)
     yield from key("ESC")
-    yield from wait_for(lambda: addon().host.running.job() is None, 20.0)
+    yield from wait_for(lambda: addon().host.running.job() is None)
     yield from wait(0.5)
     facts["stop"] = {"frames": frames(), "before": before, "frame": scene().frame_current, "state": state()}
     facts["stop"]["moved"] = moved(np.load(STRANDS))
@@ -231,13 +231,13 @@ def deleted():
     """Delete guides while they play, and restore them by Ctrl Z."""
     scene().frame_end = 60
     play()
-    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    yield from wait_for(lambda: scene().frame_current >= 6)
     activate(of_kind("GUIDES"))
     with in_viewport():
         bpy.ops.ed.undo_push(message="Before")
         bpy.ops.object.delete("EXEC_DEFAULT", True)
     at = scene().frame_current
-    yield from wait_for(lambda: scene().frame_current >= at + 4, 30.0)
+    yield from wait_for(lambda: scene().frame_current >= at + 4)
     facts["delete"] = {
         "goes on": is_playing() and scene().frame_current >= at + 4,
         "are gone": of_kind("GUIDES") is None,
@@ -252,11 +252,11 @@ def disabled():
     """Disable the add-on while the animation plays."""
     activate(of_kind("GUIDES"))
     play()
-    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    yield from wait_for(lambda: scene().frame_current >= 6)
     facts["disable"] = {"state": state(), "are finite": bool(np.isfinite(strands()).all())}
     bpy.ops.preferences.addon_disable(module=MODULE)
     at = scene().frame_current
-    yield from wait_for(lambda: scene().frame_current >= at + 4, 30.0)
+    yield from wait_for(lambda: scene().frame_current >= at + 4)
     facts["disable"]["goes on"] = is_playing() and scene().frame_current >= at + 4
     stop()
     bpy.ops.preferences.addon_enable(module=MODULE)
@@ -276,7 +276,7 @@ def begin_to_bake(override):
 
 def more_frames():
     before = len(frames())
-    yield from wait_for(lambda: len(frames()) > before + 3, 60.0)
+    yield from wait_for(lambda: len(frames()) > before + 3)
 
 
 def is_busy():
@@ -315,14 +315,14 @@ def loaded():
     activate(of_kind("GUIDES"))
     scene().frame_end = 1000
     play()
-    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    yield from wait_for(lambda: scene().frame_current >= 6)
     yield from go_on()
     facts["load"] = {"while it plays": state_after_load()}
     yield from begin_to_bake(in_viewport())
     yield from go_on()
     facts["load"]["while it is baked"] = state_after_load()
     play()
-    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    yield from wait_for(lambda: scene().frame_current >= 6)
     stop()
     facts["load"]["plays"] = scene().frame_current >= 6 and bool(np.isfinite(strands()).all())
 

@@ -25,9 +25,7 @@ PARTS = {"opengl": ("play", "bake", "end"), "vulkan": ("play", "vanish")}
 def walk(request, desktop, extension, new_profile):
     """Return the `Walk` with one backend."""
     parts = PARTS[request.param]
-    return walks.take(
-        desktop, "moving/dynamics", extension, new_profile(), request.param, parts=parts, limit=400, size=SIZE
-    )
+    return walks.take(desktop, "moving/dynamics", extension, new_profile(), request.param, parts=parts, size=SIZE)
 
 
 def test_it_comes_to_its_end(walk):

@@ -35,7 +35,7 @@ def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"
 
 
 def test_a_few_random_settings(desktop, extension, new_profile):
-    check(desktop, extension, new_profile(), seed=1, step_count=15, limit=300)
+    check(desktop, extension, new_profile(), seed=1, step_count=15, limit=1200)
 
 
 @pytest.mark.long

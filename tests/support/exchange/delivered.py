@@ -39,7 +39,7 @@ def without_addon(path, folder, times):
     out = folder / "elsewhere.npz"
     words = [sys.executable, "-c", PROGRAM, str(path), str(out), *map(str, times)]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    subprocess.run(words, check=True, cwd=folder, env=environment, capture_output=True, timeout=300)
+    subprocess.run(words, check=True, cwd=folder, env=environment, capture_output=True, timeout=1200)
     with np.load(out) as found:
         points = {float(name): found[name] for name in found}
     picture, stage = (out.with_name(out.name + ending) for ending in (".png", ".usdc"))

@@ -143,7 +143,7 @@ def kill(processes):
 
 def shell(text, folder, **variables):
     """Run shell commands in a folder; returns their output."""
-    given = {"cwd": folder, "env": os.environ | variables, "timeout": 300}
+    given = {"cwd": folder, "env": os.environ | variables, "timeout": 1200}
     done = subprocess.run(["/bin/sh", "-eu", "-c", text], capture_output=True, text=True, check=False, **given)
     assert done.returncode == 0, done.stderr
     return done.stdout
