@@ -69,8 +69,8 @@ dynamics: $(installed) ## hair that moves: strips, plots and a film in out/dynam
 pictures: $(installed) ## the pictures of README and manual, in docs; ARGS="styles grooms" for some, and for slow ones
 	$(python) blend_samples/pictures/all_pictures.py $(ARGS)
 
-build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
-	$(python) tools/build_extension.py $(PLATFORM)
+build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=windows-x64 or all for others, ARGS=--gpus for a release
+	$(python) tools/build_extension.py $(PLATFORM) $(ARGS)
 
 lint: $(installed) ## ruff: rules and format; pyrefly: types; zizmor and, with Go, actionlint: workflows
 	$(python) -m ruff check

@@ -25,7 +25,7 @@ def pytest_configure():
     """Load the kernels that `make build` has compiled from these sources, if there are any, also in processes of
     tests.
     """
-    folder = build_extension.kernel_folder(is_for_tests=True)
+    folder = build_extension.kernel_folder("tests")
     if compile_kernels.are_up_to_date(folder):
         compiled_kernels.FOLDER = folder
         os.environ[compiled_kernels.VARIABLE] = str(folder)

@@ -35,7 +35,7 @@ def extension():
     wheels are there.
     """
     compileall.compile_dir(build_extension.ROOT / "hair_addon" / "core", quiet=1)
-    return build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
+    return build_extension.build(compile_kernels.this_platform(), "tests")
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's zip, one per platform: `python tools/build_extension.py [linux-x64|windows-x64|macos-arm64|all]`.
 
-With `--kernels` it only compiles the kernels that tests load, which `make test` does before all tests.
+With `--kernels` it only compiles the kernels that tests load, which `make test` does before all tests. With `--gpus`
+the zip also contains kernels for NVIDIA GPUs, which take many minutes; without them Warp compiles those on first use.
 
 Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It needs all wheels of all
 platforms, so it gets a staged copy whose manifest lists one platform and the wheels of that platform.
@@ -99,35 +100,37 @@ def fetch(wheel: Path) -> None:
         raise BuildError(f"The manifest names {wheel.name}, which requirements.lock does not pin; correct its wheels.")
 
 
-def kernel_folder(is_for_tests: bool = False) -> Path:
-    """Return the folder for `compiled_kernels` of the sources as they are; for tests, the complete one where it
+def kernel_folder(scope: str = "") -> Path:
+    """Return the folder for `compiled_kernels` of the sources as they are; for tests, the one without a scope where it
     exists.
     """
     folder = ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
-    return folder.with_name(f"{folder.name}-tests") if is_for_tests and not folder.exists() else folder
+    if not scope or (scope == "tests" and folder.exists()):
+        return folder
+    return folder.with_name(f"{folder.name}-{scope}")
 
 
-def compiled_kernels(is_for_tests: bool = False) -> Path:
+def compiled_kernels(scope: str = "") -> Path:
     """Compile this platform's kernels if the sources have changed, which takes a minute. Returns their folder.
 
     Of several processes that ask for them at once, one compiles and the others wait.
-    is_for_tests: half of the work, as compile_kernels.py says.
+    scope: "tests" for half of the work, "gpus" also for GPUs, as options of compile_kernels.py.
     """
-    folder = kernel_folder(is_for_tests)
+    folder = kernel_folder(scope)
     folder.parent.mkdir(parents=True, exist_ok=True)
     while not compile_kernels.are_up_to_date(folder):
         with file_lock.claim(folder) as is_ours:
             if not is_ours:
                 time.sleep(0.2)
             elif not compile_kernels.are_up_to_date(folder):
-                _compile_kernels(folder, is_for_tests)
+                _compile_kernels(folder, scope)
     return folder
 
 
-def _compile_kernels(folder: Path, is_for_tests: bool) -> None:
+def _compile_kernels(folder: Path, scope: str) -> None:
     print("compiling kernels", flush=True)
     partial = folder.with_name(f"{folder.name}-{os.getpid()}")  # the folder appears whole
-    options = ["--tests"] if is_for_tests else []
+    options = [f"--{scope}"] if scope else []
     if subprocess.run([sys.executable, compile_kernels.__file__, partial, *options]).returncode != 0:
         raise BuildError("The kernels could not be compiled; see Warp's message above.")
     try:
@@ -138,13 +141,13 @@ def _compile_kernels(folder: Path, is_for_tests: bool) -> None:
         shutil.rmtree(partial)  # another process was first, on a file system without locks
 
 
-def stage(target: str, is_for_tests: bool = False) -> Path:
+def stage(target: str, scope: str = "") -> Path:
     """Stage the zip's content with a manifest for one platform. Returns its folder."""
     folder = ROOT / "build" / f"extension-{target}"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT, folder, ignore=left_out)
     if target == compile_kernels.this_platform() and target in compile_kernels.PROCESSORS:
-        shutil.copytree(compiled_kernels(is_for_tests), folder / "kernels")
+        shutil.copytree(compiled_kernels(scope), folder / "kernels")
     else:
         print(
             f"{target}: its kernels are not compiled on another platform; Blender compiles them when Vellus is enabled"
@@ -170,12 +173,12 @@ def blender_ext(*arguments: str | Path) -> None:
         raise BuildError(f"Blender's extension tool refused: {' '.join(map(str, arguments))}")
 
 
-def build(target: str, is_for_tests: bool = False) -> Path:
-    """Build and validate the zip of one platform; raises BuildError. is_for_tests: as in `compiled_kernels`."""
+def build(target: str, scope: str = "") -> Path:
+    """Build and validate the zip of one platform; raises BuildError. scope: as in `compiled_kernels`."""
     for wheel in wheels_of(target):
         if not is_locked(wheel):
             fetch(wheel)
-    folder = stage(target, is_for_tests)
+    folder = stage(target, scope)
     output = zip_path(target)
     output.parent.mkdir(exist_ok=True)
     blender_ext("build", "--source-dir", folder, "--output-filepath", output)
@@ -191,15 +194,16 @@ def main() -> None:
     parser.add_argument(
         "--kernels", action="store_true", help="only compile the kernels that tests load, if this platform has any"
     )
+    parser.add_argument("--gpus", action="store_true", help="with kernels for NVIDIA GPUs, which take many minutes")
     arguments = parser.parse_args()
     chosen = arguments.platform
     try:
         if arguments.kernels:
             if compile_kernels.this_platform() in compile_kernels.PROCESSORS:
-                compiled_kernels(is_for_tests=True)
+                compiled_kernels("tests")
             return
         for target in platforms if chosen == "all" else [chosen]:
-            output = build(target)
+            output = build(target, "gpus" if arguments.gpus else "")
             print(f"{output.relative_to(ROOT)}  {output.stat().st_size / 1e6:.0f} MB")
     except BuildError as error:
         sys.exit(f"build: {error}")

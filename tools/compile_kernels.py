@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compile the extension's kernels for the processors of this platform: `python tools/compile_kernels.py FOLDER`.
 
-Warp's compiler produces code only for the platform that it runs on, so each platform's kernels are compiled there. The
-files contain no path, time or name of this machine: the same sources and the same Warp give the same bytes.
-core/kernels/compiled_kernels.py loads them where they fit.
+Warp's compiler produces code only for the platform that it runs on, so each platform's kernels are compiled there. With
+`--gpus` kernels for NVIDIA GPUs are compiled too, which needs no GPU. The files contain no path, time or name of this
+machine: the same sources and the same Warp give the same bytes. core/kernels/compiled_kernels.py loads those that fit.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import shutil
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -63,6 +64,10 @@ _COMPARED = {
 COMPARED = {f"core.{package}.{name}" for package, names in _COMPARED.items() for name in names}
 # Best first.
 PROCESSORS = {"linux-x64": _X86, "windows-x64": _X86, "macos-arm64": (Processor("apple-m1", ()),)}
+# Compute capabilities times ten, one for each generation: 7.5 Turing, 8.0 Ampere and Ada, 9.0 Hopper, 10.0 and 12.0
+# Blackwell. As code for the GPU, not as PTX: drivers refuse PTX of a newer CUDA than theirs.
+GPUS = (75, 80, 90, 100, 120)
+_FOR_PROCESSORS_ONLY = {"core.dynamics.collision.contact_substep"}  # modules that are not launched on GPUs
 
 
 def this_platform() -> str:
@@ -86,12 +91,12 @@ def sources_digest():
     return total.hexdigest()
 
 
-def compile_into(folder, processors, is_for_tests=False):
+def compile_into(folder, processors, is_for_tests=False, gpus=()):
     """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`.
 
-    is_for_tests: for other processors than this one, compile only the modules that tests compare. Each processor's
-    modules are compiled by a process of their own: a module may take half of its time, which one thread takes. All of
-    them run at once, also on fewer cores: a process that begins late would work alone at the end.
+    is_for_tests: for other processors than this one, compile only the modules that tests compare. gpus: architectures
+    of `GPUS`. Each processor's modules are compiled by a process of their own: a module may take half of its time, and
+    has one thread. All of them run at once, also on fewer cores, as a late process would work alone at the end.
     """
     import warp as wp
 
@@ -101,7 +106,7 @@ def compile_into(folder, processors, is_for_tests=False):
     features = compiled_kernels.processor_features()
     here = next((processor for processor in processors if features.issuperset(processor.features)), None)
     cores = os.process_cpu_count() or 1
-    entries = {}
+    entries, gpu_entries = {}, {}
     with ProcessPoolExecutor(len(processors), multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
         jobs = [
             pool.submit(
@@ -115,11 +120,17 @@ def compile_into(folder, processors, is_for_tests=False):
                 entry = entries.setdefault(name, {"hash": module_hash, "files": {}})
                 if file_digest:
                     entry["files"][processor.name] = file_digest
+    with ProcessPoolExecutor(cores, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
+        for kind, compiled in pool.map(partial(_compile_for_gpu, folder), gpus):
+            for name, (module_hash, file_digest) in compiled.items():
+                gpu_entries.setdefault(name, {"hash": module_hash, "files": {}})["files"][kind] = file_digest
     index = {
         "sources": sources_digest(),
         "compiler": compiled_kernels.compiler(),
         "processors": [{"name": kind.name, "features": sorted(kind.features)} for kind in processors],
         "modules": entries,
+        "gpus": list(gpus),
+        "gpu_modules": gpu_entries,
     }
     (folder / "README.txt").write_text(README, encoding="utf-8")
     (folder / compiled_kernels.INDEX).write_text(json.dumps(index, indent=1, sort_keys=True) + "\n", encoding="utf-8")
@@ -156,6 +167,42 @@ def _compile_for(processor, folder, is_compared_only, threads):
     return found
 
 
+def _compile_for_gpu(folder, architecture):
+    """Write the modules of one of `GPUS`. Return (its type, {module: (hash, digest of its files)})."""
+    import warp as wp
+
+    wp.config.kernel_cache_dir = str(CACHE)
+    wp.config.log_level = wp.LOG_WARNING
+    wp.init()
+    from hair_addon.core.kernels import compiled_kernels
+
+    kind, found = compiled_kernels.gpu_type(architecture), {}
+    for module in _warp_modules():
+        name = compiled_kernels.short_name(module)
+        if not module.kernels or name in _FOR_PROCESSORS_ONLY:
+            continue
+        module._compile(None, output_arch=architecture, use_ptx=False)
+        made, block_dim = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(), module.options["block_dim"]
+        compiled = [
+            made / module._get_compile_output_name(None, architecture, use_ptx=False, block_dim=block_dim),
+            made / module._get_meta_name(block_dim=block_dim),
+        ]
+        for path, its in zip(compiled_kernels.file_names(name, kind), compiled, strict=True):
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(its, folder / path)
+        found[name] = module.get_module_hash(block_dim).hex(), compiled_kernels.digest(*compiled)
+    return kind, found
+
+
+def gpus_of_compiler():
+    """Return the architectures that this platform's Warp compiles for, none on a Mac."""
+    import warp as wp
+    from warp._src import context
+
+    wp.init()
+    return set(context.runtime.nvrtc_supported_archs)
+
+
 def _warp_modules():
     """Warp's modules of every file of the core, which are known to it once the files are imported."""
     import warp as wp
@@ -182,13 +229,16 @@ def main():
     parser = argparse.ArgumentParser(description="Compile the extension's kernels for this platform.")
     parser.add_argument("folder", type=Path, help="output folder; its content is replaced")
     parser.add_argument("--tests", action="store_true", help="for older processors, only what tests compare")
+    parser.add_argument("--gpus", action="store_true", help="also for NVIDIA GPUs, which takes many minutes")
     arguments = parser.parse_args()
     folder = arguments.folder.resolve()
     processors = PROCESSORS.get(this_platform())
     if processors is None:
         sys.exit(f"Kernels are not compiled for {this_platform()}.")
+    if arguments.gpus and not gpus_of_compiler().issuperset(GPUS):
+        sys.exit(f"Kernels for NVIDIA GPUs are not compiled on {this_platform()}.")
     shutil.rmtree(folder, ignore_errors=True)
-    compile_into(folder, processors, arguments.tests)
+    compile_into(folder, processors, arguments.tests, GPUS if arguments.gpus else ())
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ def save_bare(folder):
 
 def cut(name):
     """Make a haircut in a window and save its file. Raises `RuntimeError`."""
-    extension = build_extension.build(compile_kernels.this_platform(), is_for_tests=True)
+    extension = build_extension.build(compile_kernels.this_platform(), "tests")
     profile, log = OUT / "profile", OUT / f"{name}.log"
     shutil.rmtree(profile, ignore_errors=True)  # it may contain an older version of the extension
     profile.mkdir(parents=True)

@@ -42,7 +42,7 @@ def extension(tmp_path_factory):
     return _once(
         tmp_path_factory,
         "extension",
-        lambda _folder: build_extension.build(compile_kernels.this_platform(), is_for_tests=True),
+        lambda _folder: build_extension.build(compile_kernels.this_platform(), "tests"),
     )
 
 

@@ -3,7 +3,8 @@
 
 `tools/compile_kernels.py` writes the folder: an index, and an object file for each Warp module and processor type. A
 module is loaded only if the versions of Warp and its compiler match, the processor supports all features that the file
-was compiled for, and Warp's hash of the module's sources and options matches. The folder is only read.
+was compiled for, and Warp's hash of the module's sources and options matches. A release also has files for NVIDIA GPUs:
+code for compute capability X.Y runs on X.Z if Z >= Y. The folder is only read.
 """
 
 import hashlib
@@ -11,7 +12,7 @@ import json
 import os
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     import warp as wp
@@ -20,23 +21,37 @@ VARIABLE = "VELLUS_KERNELS"  # environment variable with another folder, such as
 FOLDER = Path(os.environ.get(VARIABLE) or Path(__file__).resolve().parents[3] / "kernels")
 INDEX = "index.json"
 
+_GPU = "sm_"  # prefix of the names of GPU types
+
 _PACKAGE = __name__.removesuffix("core.kernels.compiled_kernels")  # prefix of Warp's names of our modules
 
 
 def load(module: "wp.Module", device: "wp.Device") -> bool:
-    """Load a Warp module's precompiled kernels on the CPU, and return whether matching kernels were found."""
-    if not device.is_cpu:
-        return False
-    processor, modules = _fitting(FOLDER)
+    """Load a Warp module's precompiled kernels, and return whether matching kernels were found."""
+    kind, modules = _fitting(FOLDER) if device.is_cpu else _fitting_gpu(FOLDER, device.arch)
+    block_dim = block_dim_of(module, device)
     module_hash, digests = modules.get(short_name(module), ("", {}))
-    if not digests or module_hash != module.get_module_hash(1).hex():
+    if kind not in digests or module_hash != module.get_module_hash(block_dim).hex():
         return False
-    binary, meta = (FOLDER / path for path in file_names(short_name(module), processor))
-    if digests.get(processor, "") != digest(binary, meta):
+    binary, meta = (FOLDER / path for path in file_names(short_name(module), kind))
+    found = digest(binary, meta)
+    if found is None or digests[kind] != found:
         return False
-    # On the CPU a block has one thread.
-    module.load(device, block_dim=1, binary_path=binary, meta_path=meta)
+    files = {"binary_path": binary, "meta_path": meta}
+    if device.is_cpu:
+        module.load(device, block_dim=block_dim, **files)
+        return True
+    try:
+        module.load(device, block_dim=block_dim, output_arch=architecture_of(kind), **files)
+    except Exception:  # Warp raises nothing more specific if the driver refuses the code
+        module.unload()
+        return False
     return True
+
+
+def block_dim_of(module: "wp.Module", device: "wp.Device") -> int:
+    """Return the threads of a block that a module is compiled for: one on the CPU."""
+    return 1 if device.is_cpu else module.options["block_dim"]
 
 
 def short_name(module: "wp.Module") -> str:
@@ -44,9 +59,21 @@ def short_name(module: "wp.Module") -> str:
     return module.name.removeprefix(_PACKAGE)
 
 
-def file_names(module_name: str, processor: str) -> tuple[str, str]:
-    """Return the relative paths of a module's object file and metadata."""
-    return f"{processor}/{module_name}.o", f"{module_name}.meta"
+def file_names(module_name: str, kind: str) -> tuple[str, str]:
+    """Return the relative paths of a module's compiled file and metadata. kind: a processor type or GPU type."""
+    if kind.startswith(_GPU):
+        return f"{kind}/{module_name}.cubin", f"{kind}/{module_name}.meta"
+    return f"{kind}/{module_name}.o", f"{module_name}.meta"
+
+
+def gpu_type(architecture: int) -> str:
+    """Return the name of a GPU type, such as sm_80 for 80, which is compute capability 8.0."""
+    return f"{_GPU}{architecture}"
+
+
+def architecture_of(kind: str) -> int:
+    """Return the architecture of a GPU type, such as 80 for sm_80."""
+    return int(kind.removeprefix(_GPU))
 
 
 def digest(binary: Path, meta: Path) -> str | None:
@@ -83,27 +110,56 @@ def _warp_context():
     return context
 
 
+class _Index(NamedTuple):
+    compiler: dict[str, Any]
+    processors: list[tuple[str, frozenset[str]]]  # (name, its features), best first
+    modules: dict[str, tuple[str, dict[str, str]]]  # {name: (Warp's hash, {processor type: digest})}
+    gpus: list[int]  # architectures
+    gpu_modules: dict[str, tuple[str, dict[str, str]]]  # {name: (Warp's hash, {GPU type: digest})}
+
+
 @cache
 def _fitting(folder):
     """Return (best matching processor type, {module: (hash, {processor: digest})}); ("", {}) for none."""
-    import warp as wp
-
-    try:
-        made_by, processors, modules = _read_index(folder)
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return "", {}  # missing, or not written by tools/compile_kernels.py
-    if made_by.get("warp") != wp.config.version or made_by != compiler():
-        return "", {}
-    features = processor_features()
-    for name, needed in processors:
-        if features.issuperset(needed):
-            return name, modules
+    index = _index_of_this_compiler(folder)
+    if index is not None:
+        features = processor_features()
+        for name, needed in index.processors:
+            if features.issuperset(needed):
+                return name, index.modules
     return "", {}
 
 
+@cache
+def _fitting_gpu(folder, architecture):
+    """Return (best matching GPU type, {module: (hash, {GPU type: digest})}); ("", {}) for none."""
+    index = _index_of_this_compiler(folder)
+    if index is not None:
+        fitting = [each for each in index.gpus if each // 10 == architecture // 10 and each <= architecture]
+        if fitting:
+            return gpu_type(max(fitting)), index.gpu_modules
+    return "", {}
+
+
+def _index_of_this_compiler(folder):
+    """Return the folder's index, or None if it is missing, invalid, or made by another compiler."""
+    import warp as wp
+
+    try:
+        index = _read_index(folder)
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    is_ours = index.compiler.get("warp") == wp.config.version and index.compiler == compiler()
+    return index if is_ours else None
+
+
 def _read_index(folder):
-    """Return (compiler, [(processor, its features)], {module: (hash, digests)}); raises for invalid content."""
+    """Read the index of a folder; raises for invalid content."""
     index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
     processors = [(str(kind["name"]), frozenset(kind["features"])) for kind in index["processors"]]
-    entries = {name: (str(entry["hash"]), dict(entry["files"])) for name, entry in index["modules"].items()}
-    return dict(index["compiler"]), processors, entries
+    modules, gpu_modules = (
+        {name: (str(entry["hash"]), dict(entry["files"])) for name, entry in index[key].items()}
+        for key in ("modules", "gpu_modules")
+    )
+    gpus = [int(architecture) for architecture in index["gpus"]]
+    return _Index(dict(index["compiler"]), processors, modules, gpus, gpu_modules)

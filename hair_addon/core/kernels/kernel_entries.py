@@ -71,7 +71,7 @@ def _publish(temporary, place):
 def _load(device, module, binary, meta):
     module.load(
         device,
-        block_dim=_block_dim(device, module),
+        block_dim=compiled_kernels.block_dim_of(module, device),
         binary_path=binary,
         output_arch=module._get_compile_arch(device),
         meta_path=meta,
@@ -88,12 +88,14 @@ def _is_whole(binary, meta):
 
 def _place(device, module):
     """Return the folder of a module's compiled kernels, shared by devices with the same block size."""
-    return Path(wp.config.kernel_cache_dir) / module.get_module_identifier(_block_dim(device, module))
+    return Path(wp.config.kernel_cache_dir) / module.get_module_identifier(
+        compiled_kernels.block_dim_of(module, device)
+    )
 
 
 def _files(device, module, folder):
     """Return the paths of the compiled file and of its metadata in a module's folder."""
-    block_dim = _block_dim(device, module)
+    block_dim = compiled_kernels.block_dim_of(module, device)
     return folder / module._get_compile_output_name(device, block_dim=block_dim), folder / module._get_meta_name(
         block_dim
     )
@@ -104,10 +106,5 @@ def _digest_of(binary):
 
 
 def _options(device, module):
-    module.get_module_hash(_block_dim(device, module))  # resolves the options
-    return module.resolved_options[_block_dim(device, module)]
-
-
-def _block_dim(device, module):
-    # On the CPU a block has one thread.
-    return 1 if device.is_cpu else module.options["block_dim"]
+    module.get_module_hash(compiled_kernels.block_dim_of(module, device))  # resolves the options
+    return module.resolved_options[compiled_kernels.block_dim_of(module, device)]

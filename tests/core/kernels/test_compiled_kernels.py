@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 import warp as wp
@@ -64,7 +65,7 @@ OLD_PROCESSOR = {
 @pytest.fixture(scope="module")
 def made():
     """Return the folder as in the extension's zip, compiled once for the same sources."""
-    return build_extension.compiled_kernels(is_for_tests=True)
+    return build_extension.compiled_kernels("tests")
 
 
 @pytest.fixture
@@ -90,7 +91,7 @@ def change_index(folder, change):
 def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch):
     compiling, asked = [], threading.Barrier(3)
 
-    def compile_kernels_once(folder, _is_for_tests):
+    def compile_kernels_once(folder, _scope):
         compiling.append(folder)
         folder.mkdir()
 
@@ -98,7 +99,7 @@ def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch
         asked.wait()
         return build_extension.compiled_kernels()
 
-    monkeypatch.setattr(build_extension, "kernel_folder", lambda _is_for_tests: tmp_path / "kernels" / "here")
+    monkeypatch.setattr(build_extension, "kernel_folder", lambda _scope: tmp_path / "kernels" / "here")
     monkeypatch.setattr(compile_kernels, "are_up_to_date", lambda folder: folder.exists())
     monkeypatch.setattr(build_extension, "_compile_kernels", compile_kernels_once)
     with ThreadPoolExecutor(3) as pool:
@@ -238,6 +239,64 @@ def test_a_damaged_file(folder):
     assert not loads()
     (folder / binary).unlink()
     assert not loads()
+
+
+@pytest.fixture
+def gpu_folder(folder, monkeypatch):
+    """Return a folder with the kernels of one module for two GPU types."""
+    if not set(compile_kernels.GPUS) <= compile_kernels.gpus_of_compiler():
+        pytest.skip("this platform's Warp does not compile for GPUs")
+    module = wp.get_module(bspline.__name__)
+    monkeypatch.setattr(compile_kernels, "_warp_modules", lambda: [module])
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", wp.config.kernel_cache_dir)
+    monkeypatch.setattr(wp.config, "log_level", wp.config.log_level)
+    entry = {"hash": module.get_module_hash().hex(), "files": {}}
+    for architecture in (80, 90):
+        kind, compiled = compile_kernels._compile_for_gpu(folder, architecture)
+        ((name, (module_hash, entry["files"][kind])),) = compiled.items()
+        assert module_hash == entry["hash"]
+    change_index(folder, lambda index: index.update(gpus=[80, 90], gpu_modules={name: entry}))
+    return folder
+
+
+def loaded_on_gpu(monkeypatch, architecture):
+    """Return (whether kernels were loaded on a GPU of an architecture, [(GPU type, architecture of the file)])."""
+    module, calls = wp.get_module(bspline.__name__), []
+
+    def load(_device, block_dim, output_arch, binary_path, meta_path):
+        assert block_dim == module.options["block_dim"]
+        assert json.loads(meta_path.read_text(encoding="utf-8"))
+        calls.append((binary_path.parent.name, output_arch))
+
+    monkeypatch.setattr(module, "load", load)
+    return compiled_kernels.load(module, SimpleNamespace(is_cpu=False, arch=architecture)), calls
+
+
+@pytest.mark.parametrize(
+    ("architecture", "expected"), [(75, None), (80, 80), (89, 80), (90, 90), (100, None)], ids=lambda value: str(value)
+)
+@pytest.mark.usefixtures("gpu_folder")
+def test_kernels_of_a_gpu_of_the_same_generation_are_loaded(monkeypatch, architecture, expected):
+    """Code for a GPU runs on GPUs of the same first number of the compute capability that are not older."""
+    expected_calls = [] if expected is None else [(f"sm_{expected}", expected)]
+    assert loaded_on_gpu(monkeypatch, architecture) == (expected is not None, expected_calls)
+
+
+def test_kernels_of_gpus_that_do_not_fit(gpu_folder, monkeypatch):
+    """Damaged files, other sources, and code that the driver refuses are left out."""
+    module = wp.get_module(bspline.__name__)
+
+    def refuse(*_arguments, **_options):
+        raise Exception("CUDA error")
+
+    monkeypatch.setattr(module, "load", refuse)
+    assert not compiled_kernels.load(module, SimpleNamespace(is_cpu=False, arch=90))
+    path = gpu_folder / "sm_90" / "core.geometry.curves.bspline.cubin"
+    path.write_bytes(path.read_bytes()[:-1])
+    assert loaded_on_gpu(monkeypatch, 90) == (False, [])
+    change_index(gpu_folder, lambda index: index["gpu_modules"]["core.geometry.curves.bspline"].update(hash="0"))
+    compiled_kernels._fitting_gpu.cache_clear()
+    assert loaded_on_gpu(monkeypatch, 80) == (False, [])
 
 
 def test_nothing_of_this_machine(made):

@@ -219,7 +219,7 @@ def _index_data():
     files = {"any": hashlib.sha256(b"code{}").hexdigest()}
     modules = {"core.geometry.transform": {"hash": bytes(4).hex(), "files": files}}
     index = {"compiler": compiled_kernels.compiler(), "processors": [{"name": "any", "features": []}]}
-    return json.dumps(index | {"modules": modules}, indent=1).encode()
+    return json.dumps(index | {"modules": modules, "gpus": [], "gpu_modules": {}}, indent=1).encode()
 
 
 # ------------------------------------------------------------------------------------------------- words of a command
