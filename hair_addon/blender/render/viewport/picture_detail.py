@@ -62,32 +62,34 @@ def of_hair(drawn, camera, size, per_side, is_shadowed=False):
     camera: (world to view, view to clip), each (4, 4); per_side: minimum samples along each side of a pixel;
     is_shadowed: contain the surfaces that hair darkens too.
     """
-    window = _window(drawn, camera, size, is_shadowed)
-    area = window[2] * window[3]
-    samples = min(_WANTED_SAMPLES, _LARGEST_PART * size[0] * size[1] * per_side**2)
-    finer = min(round(np.sqrt(samples / area)), _MOST_PER_SIDE) if area else 0
+    most = min(_WANTED_SAMPLES, _LARGEST_PART * size[0] * size[1] * per_side**2)
+    low, high, finer = np.array(size), np.zeros(2, int), 0
+    for found in _windows(drawn, camera, size, is_shadowed):
+        found = found[(found[:, 2:] > 0).all(axis=1)]
+        if not len(found):
+            continue
+        low = np.minimum(low, found[:, :2].min(axis=0))
+        high = np.maximum(high, (found[:, :2] + found[:, 2:]).max(axis=0))
+        finer = min(round(np.sqrt(most / np.prod(high - low))), _MOST_PER_SIDE)
+        if finer <= per_side:
+            break  # large hair: more hair makes the part larger
+    window = *low.tolist(), *np.maximum(high - low, 0).tolist()
     return Detail(finer, _tile_around(window, size)) if finer > per_side else whole(size, per_side)
 
 
-def _window(drawn, camera, size, is_shadowed):
-    """Return (left, bottom, width, height) [pixels] of the part of a picture that contains all hair, and its
+def _windows(drawn, camera, size, is_shadowed):
+    """Yield (N, 4) (left, bottom, width, height) [pixels] of the parts of a picture that contain hair, and its
     surfaces.
     """
     view = drawing.pass_record(*camera, size)
-    found = [np.zeros((0, 4), int)]
     for batch in drawn.batches:
         records = drawing.strand_records(batch.strands, view, batch.to_world)
-        found.append(windows.of_strands(batch.strands, records, size))
+        yield windows.of_strands(batch.strands, records, size)
     if is_shadowed:
         for surface, _lights, _seen, is_darkened in drawn.shadowed:
             if is_darkened:
                 to_clip = camera[1] @ camera[0] @ surface.to_world.reshape(-1, 4, 4)
-                found.append(windows.of_boxes(surface.bounds, to_clip, size))
-    found = np.concatenate(found)
-    found = found[(found[:, 2:] > 0).all(axis=1)]
-    low = found[:, :2].min(axis=0, initial=max(size)).clip(max=size)
-    high = (found[:, :2] + found[:, 2:]).max(axis=0, initial=0)
-    return (*low.tolist(), *np.maximum(high - low, 0).tolist())
+                yield windows.of_boxes(surface.bounds, to_clip, size)
 
 
 def _tile_around(window, size):
