@@ -7,7 +7,7 @@
 # Let uv use the system's certificates, as pip does: some networks have their own.
 export UV_SYSTEM_CERTS = true
 
-# Downloads from a slow or unsteady network are waited for and repeated.
+# Slow downloads are waited for, and failed downloads are repeated.
 export UV_HTTP_RETRIES = 10
 export UV_HTTP_TIMEOUT = 300
 export PIP_RETRIES = 10
@@ -30,7 +30,7 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 # As many processes test as there are processors: threads of Mesa and of OpenBLAS would only wait for one another.
 test farm long: export LP_NUM_THREADS = 0
 test farm long: export OPENBLAS_NUM_THREADS = 1
-# The order of sets of words is the same in each run.
+# The order of sets of strings is the same in each run.
 test farm long desktop: export PYTHONHASHSEED = 0
 
 # All tests load kernels that are compiled once, in place of each process compiling them.

@@ -2,7 +2,8 @@
 """The extension's zip, one per platform: `python tools/build_extension.py [linux-x64|windows-x64|macos-arm64|all]`.
 
 With `--kernels` it only compiles the kernels that tests load, which `make test` does before all tests. With `--gpus`
-the zip also contains kernels for NVIDIA GPUs, which take many minutes; without them Warp compiles those on first use.
+the zip also contains kernels for NVIDIA GPUs, which take many minutes to compile; otherwise Warp compiles them on first
+use.
 
 Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It needs all wheels of all
 platforms, so it gets a staged copy whose manifest lists one platform and the wheels of that platform.
@@ -101,7 +102,7 @@ def fetch(wheel: Path) -> None:
 
 
 def kernel_folder(scope: str = "") -> Path:
-    """Return the folder for `compiled_kernels` of the sources as they are; for tests, the one without a scope where it
+    """Return the folder for `compiled_kernels` of the present sources; for tests, the folder without a scope if it
     exists.
     """
     folder = ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
@@ -114,7 +115,7 @@ def compiled_kernels(scope: str = "") -> Path:
     """Compile this platform's kernels if the sources have changed, which takes a minute. Returns their folder.
 
     Of several processes that ask for them at once, one compiles and the others wait.
-    scope: "tests" for half of the work, "gpus" also for GPUs, as options of compile_kernels.py.
+    scope: "tests" to compile half of the kernels, "gpus" to add kernels for GPUs, as by options of compile_kernels.py.
     """
     folder = kernel_folder(scope)
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -194,7 +195,7 @@ def main() -> None:
     parser.add_argument(
         "--kernels", action="store_true", help="only compile the kernels that tests load, if this platform has any"
     )
-    parser.add_argument("--gpus", action="store_true", help="with kernels for NVIDIA GPUs, which take many minutes")
+    parser.add_argument("--gpus", action="store_true", help="add kernels for NVIDIA GPUs; takes many minutes")
     arguments = parser.parse_args()
     chosen = arguments.platform
     try:

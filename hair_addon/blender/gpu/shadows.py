@@ -82,8 +82,8 @@ class ShadowMaps:
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU];
         steps: level of detail of each hair; casters: a light's index → (hair, surfaces) that cast its shadow, None:
         all; is_steady: keep the aim of maps as long as hair fits; chosen: index of the only light whose map is drawn,
-        None: all; counted: maximum number of strands of each hair in layers, thicker in proportion, while all strands
-        bound the hair, None: all strands.
+        None: all; counted: maximum number of strands of each hair that layers count, thickened in proportion, None: all
+        strands; the ends of the hair are those of all strands.
         """
         lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
@@ -334,7 +334,7 @@ def _records(strands, view, to_world, steps, is_steady):
 
 
 def _fewer(records, count):
-    """Return `_records` with at most `count` strands, thicker in proportion; None: all strands."""
+    """Return `_records` with at most `count` strands, thickened in proportion; None: all strands."""
     if count is None or (records["drawn_strands"] <= count).all():
         return records
     fewer = records.copy()

@@ -89,9 +89,9 @@ class _Placed:
 class NearestSamples:
     """The sample that represents each pixel of a picture.
 
-    texture: its index in the textures of a `VisibilityBuffer`, row by row; per_side: samples along each side of a
-    pixel; corner: of the buffer in the picture [samples]; reach: maximum distance of the sample from its pixel
-    [pixels].
+    texture: the sample's index in the textures of a `VisibilityBuffer`, row by row; per_side: samples along each side
+    of a pixel; corner: origin of the buffer in the picture [samples]; reach: maximum distance of the sample from its
+    pixel [pixels].
     """
 
     texture: gpu.types.GPUTexture

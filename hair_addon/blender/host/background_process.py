@@ -156,7 +156,7 @@ def end():
 
 
 def exit_and_remove(folders):
-    """End this process and let another remove folders after that: until then jobs and Blender write into them."""
+    """End this process, and start another that then removes folders: jobs and Blender write into them until the end."""
     with contextlib.suppress(OSError):  # no process can start: the folders are left
         remover = subprocess.Popen(
             [sys.executable, "-I", "-c", _REMOVE],

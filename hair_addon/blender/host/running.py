@@ -22,12 +22,12 @@ def has_window():
 
 
 def may_wait():
-    """Whether data may be written a moment after an update: in a window, unless a script that may read it updates."""
+    """Whether data may be written a moment after an update: in a window, but not for scripts, which may read it."""
     return has_window() and not _is_in_script()
 
 
 def _is_in_script():
-    """Whether a script or another add-on runs: the outermost function is not of this add-on.
+    """Whether a script or another add-on runs: the outermost function does not belong to this add-on.
 
     Without a window every update comes from a script.
     """

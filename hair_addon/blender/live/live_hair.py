@@ -3,7 +3,7 @@
 
 In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and so are looks from
 painted maps. The hair's Curves are written at the end of the interaction, or before they are read. Without a window
-and in updates by scripts, which may read them next, they are written at once.
+and in updates by scripts, which may read the Curves next, they are written at once.
 """
 
 import sys

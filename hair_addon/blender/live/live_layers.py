@@ -44,7 +44,7 @@ def follow_masks(surfaces, depsgraph):
 
 
 def follow_frame(depsgraph):
-    """Compose guides whose weights, or eyes, are animated; returns {guide Curves that moved: None}."""
+    """Compose guides with layers whose weight or visibility is animated; returns {guide Curves that moved: None}."""
     moved = {}
     for guides in with_layers():
         if guides.animation_data is None:

@@ -49,7 +49,7 @@ def follow_frame(blender_scene, depsgraph):
     """Move all simulated guides and their hair to the scene's time.
 
     For a viewport the next frame is simulated if it is not baked; a render only shows existing frames. Guides on
-    surfaces of other scenes stay at the times of these scenes.
+    surfaces of other scenes stay at the time of their scene.
     """
     if running.job() is not None or guide_baking.is_baking():
         return
@@ -71,6 +71,7 @@ def follow_frame(blender_scene, depsgraph):
 
 
 def _of_scene(simulating, depsgraph):
+    """Return the simulated guides without a surface or with a surface in the scene of a depsgraph."""
     return [one for one in simulating if one.surface is None or usable_surfaces.is_in(one.surface, depsgraph)]
 
 
@@ -117,9 +118,7 @@ def note_combed(combed, blender_scene):
 
 
 def show_known(simulating, blender_scene, depsgraph):
-    """Show simulated guides of a scene at their known points after loading, copying, undo or redo, which show them as
-    combed.
-    """
+    """Show simulated guides of a scene at their known points. Loading, copying, undo and redo show them as combed."""
     for guides in _of_scene(simulating, depsgraph):
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)

@@ -144,7 +144,7 @@ def _draw_surfaces(drawn, motion, view):
 
 
 def _of_hair(drawn, motion):
-    """Return [({instance: record}, {sampler: texture})] of all hair."""
+    """Return [({"motion": record}, {sampler: texture})] of all hair."""
     return [({"motion": record}, samplers) for record, samplers in map(motion.hair, _unique(drawn.owners))]
 
 

@@ -305,21 +305,21 @@ def collider_rows(layout, owner):
 
 
 def all_guide_rows(layout, owner, surface):
-    """The rows of the Guides panel and those below it, for a redo panel, where panels other than growth are closed."""
+    """The rows of the Guides panel and of the panels below it, for a redo panel; only Growth is open at first."""
     guide_rows(layout, owner, surface)
     _panel(layout, "Growth", False, growth_rows, owner)
     _panel(layout, "Placement", True, placement_rows, owner)
 
 
 def all_strand_rows(layout, owner, surface, skip=()):
-    """The rows of the Strands panel, and closed panels with the rows below it, for a redo panel."""
+    """The rows of the Strands panel and of the panels below it, for a redo panel; these are collapsed at first."""
     strand_rows(layout, owner, surface, skip)
     _panel(layout, "Parting", True, parting_rows, owner, surface)
     _panel(layout, "Advanced", True, blending_rows, owner, skip)
 
 
 def _panel(layout, title, is_closed, draw, *parameters):
-    """Draw rows in a panel; is_closed: until the user opens the panel, whose state Blender keeps."""
+    """Draw rows in a panel; is_closed: collapsed until the user opens it. Blender remembers open panels."""
     header, body = layout.panel(f"VELLUS_PT_redo_{title.lower()}", default_closed=is_closed)
     header.label(text=interface_text(title), translate=False)
     if body is not None:

@@ -54,7 +54,7 @@ def strand_arrival_program():
 
 
 MOTION_FORMAT = "RGBA32F"  # of motion vectors
-CARRIED_MOTION_FORMAT = "RG32F"  # of those to the previous frame alone
+CARRIED_MOTION_FORMAT = "RG32F"  # of motion vectors to the previous frame alone
 
 
 @shaders.cached

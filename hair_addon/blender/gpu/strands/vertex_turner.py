@@ -38,7 +38,7 @@ class VertexTurner:
     vertex_count: int  # of the mesh
     turned_count: int
     values: np.ndarray  # (rows, row) float32, a buffer for uploads of positions
-    turned_to: list = field(default_factory=list)  # [vertices that `turned` was computed for, or None at rest]
+    turned_to: list = field(default_factory=list)  # [vertices of `turned`, None at rest]; empty: not computed
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
@@ -47,7 +47,7 @@ class VertexTurner:
         return [self.turned, self.rings, self.around, self.faces, *rest]
 
     def turn(self, posed: np.ndarray | None) -> gpu.types.GPUTexture:
-        """Compute `turned` for finite (V, 3) float32 vertices of the mesh, unless it has those of the same array.
+        """Compute `turned` for finite (V, 3) float32 vertices of the mesh, unless it was computed for the same array.
 
         posed: the vertices, which must not change later; None: at rest. Raises `HairError` if their number does not
         match.

@@ -31,12 +31,12 @@ def render(path, name, matrix, frame, is_coarse, out):
     directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse: render
     a small picture in less time.
     """
-    scene, light, tree = _opened(path, name, Path(out).parent)
+    scene, light, tree = _load_light(path, name, Path(out).parent)
     for setting, value in _PLAIN.items():
         setattr(light, setting, value)
     world_panorama.replace_light_paths(tree, set())
     _replace_falloffs(tree)
-    _place(scene, light, Matrix(matrix))
+    _add_lamp(scene, light, Matrix(matrix))
     pixels = {"SPOT": light_panoramas.SIZE, "AREA": light_panoramas.AREA_SIZE}.get(
         light.type, light_panoramas.WIDE_SIZE
     )
@@ -57,10 +57,10 @@ def render(path, name, matrix, frame, is_coarse, out):
     os.replace(part.with_suffix(".npz"), out)
 
 
-def _opened(path, name, folder):
-    """Return (scene, light, its nodes) of a new file with a light of a .blend. Raises `HairError`.
+def _load_light(path, name, folder):
+    """Open an empty file, load a light of a .blend and return (scene, light, node tree). Raises `HairError`.
 
-    folder: of unsaved images.
+    folder: contains unsaved images.
     """
     try:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -75,8 +75,8 @@ def _opened(path, name, folder):
         raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
 
 
-def _place(scene, light, matrix):
-    """Add a light to a scene at a matrix (4, 4), with a camera there and a white sphere around both."""
+def _add_lamp(scene, light, matrix):
+    """Add a lamp to a scene at a matrix (4, 4), with a camera in the same place and a white sphere around both."""
     lamp = bpy.data.objects.new("Light", light)
     scene.collection.objects.link(lamp)
     lamp.matrix_world = matrix
@@ -87,7 +87,7 @@ def _place(scene, light, matrix):
 
 
 def _replace_nodes(tree):
-    """Let a light shine as without nodes."""
+    """Replace the nodes of a light with plain emission."""
     emission = tree.nodes.new("ShaderNodeEmission")
     emission.inputs["Strength"].default_value = 1.0
     tree.links.new(emission.outputs[0], tree.get_output_node("ALL").inputs["Surface"])

@@ -19,7 +19,7 @@ from .. import motion_vectors
 # Maximum weight of the last picture in passes: of the same strands, and of others, whose noise would hide changes.
 _MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
 _MOST_OF_STILL = 96.0  # if only lights have moved: the picture is not blurred, and only light may lag
-_REACH = 5  # pixels: the search radius of picture/history_places.comp, and one
+_REACH = 5  # pixels: the search radius of picture/history_places.comp, plus one
 
 
 class _Targets:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the light of paths depends on, except the view, and the part of the light that stays valid after changes."""
+"""The scene content that the light of paths depends on, and the part of this light that stays valid after changes."""
 
 from dataclasses import dataclass, replace
 

@@ -72,14 +72,14 @@ def of_hair(drawn, camera, size, per_side, is_shadowed=False):
         high = np.maximum(high, (found[:, :2] + found[:, 2:]).max(axis=0))
         finer = min(round(np.sqrt(most / np.prod(high - low))), _MOST_PER_SIDE)
         if finer <= per_side:
-            break  # large hair: more hair makes the part larger
+            break  # large hair: further windows only enlarge the part
     window = *low.tolist(), *np.maximum(high - low, 0).tolist()
     return Detail(finer, _tile_around(window, size)) if finer > per_side else whole(size, per_side)
 
 
 def _windows(drawn, camera, size, is_shadowed):
-    """Yield (N, 4) (left, bottom, width, height) [pixels] of the parts of a picture that contain hair, and its
-    surfaces.
+    """Yield arrays (N, 4) of windows (left, bottom, width, height) [pixels] that contain hair, or surfaces that it
+    darkens.
     """
     view = drawing.pass_record(*camera, size)
     for batch in drawn.batches:
