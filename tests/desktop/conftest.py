@@ -31,7 +31,7 @@ def _once(tmp_path_factory, name, make):
     with open(folder / f"{name}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # until it is closed
         if not made.exists():
-            (folder / name).mkdir(exist_ok=True)  # it is there if another process has failed
+            (folder / name).mkdir(exist_ok=True)  # it exists if another process has failed
             made.write_text(str(make(folder / name)))
     return Path(made.read_text())
 

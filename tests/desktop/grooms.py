@@ -63,7 +63,7 @@ def shelf(hair, folder, facts):
     facts["before"] = _hair_count()
     region = next(region for region in area.regions if region.type == "ASSET_SHELF")
     first = np.array([region.x + 50, region.y + region.height - 45])
-    for _time in range(10):  # a shelf whose assets are not read yet takes no click
+    for _time in range(10):  # a shelf ignores clicks until its assets are read
         yield from drag(first, first, steps=1)
         yield from wait_for(lambda: _hair_count() > facts["before"], 5.0)
         yield from wait_for(lambda: addon().host.running.job() is None)

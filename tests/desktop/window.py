@@ -12,7 +12,7 @@ import numpy as np
 # Seconds after which a window that was drawn is seen.
 _SHOWN = 0.5
 
-# Rounds of Blender's events in which timers of the add-on that start each other have run, on processors of any speed.
+# Rounds of Blender's events after which timers of the add-on that start each other have run, at any processor speed.
 _ROUNDS = 5
 
 MODULE = "bl_ext.user_default.vellus"

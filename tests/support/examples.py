@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of Hypothesis: the same examples in each run, and no limits of time, as processors are shared.
+"""Settings of Hypothesis: the same examples in each run, and no time limits, as processors are shared.
 
 Imported by conftest.py of its tests.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modal operators of all windows are found, and updates by scripts are told from those of the window."""
+"""Modal operators of all windows are found, and updates by scripts are distinguished from updates by the window."""
 
 import _thread
 import queue
@@ -23,7 +23,7 @@ def test_handlers_without_an_operator_are_passed_over():
 
 
 def test_data_waits_in_a_window_but_not_for_scripts(monkeypatch):
-    """Blender calls handlers without a Python function around them; a thread begins without any, too."""
+    """Blender calls handlers without an outer Python function, as a thread starts its function here."""
     monkeypatch.setattr(running, "bpy", SimpleNamespace(app=SimpleNamespace(background=False)))
     found = queue.Queue()
     names = {"__name__": "hair_addon.blender.live.handlers", "found": found, "running": running}

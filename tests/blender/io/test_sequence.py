@@ -128,8 +128,8 @@ def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
 @pytest.mark.farm
 @pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
 def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
-    """The same command goes on after it was stopped. Its last frame is claimed here until then, so that it cannot end
-    before.
+    """A stopped command continues when it is started again. The test claims the last frame until the command stops, so
+    that it cannot end earlier.
     """
     with claim(tmp_path / ALL[-1]), start(turning, tmp_path) as process:
         lines = [process.stdout.readline() for _ in range(2)]

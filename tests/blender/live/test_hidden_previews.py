@@ -127,7 +127,7 @@ def move_slider(hair, value):
 
 
 def test_a_dragged_slider_hides_hair_until_it_rests(posed, monkeypatch):
-    moments = [0.0]  # of a clock that stands still while hair is made and drawn, on processors of any speed
+    moments = [0.0]  # times of a clock that stands still while hair is made and drawn, at any processor speed
     monkeypatch.setattr(hidden_previews, "time", SimpleNamespace(monotonic=lambda: moments[-1]))
     posed.data.vellus.hair.automatic_influence = False
     view = viewport.view_cache.keep("seen", viewport._View(()))

@@ -51,9 +51,7 @@ def settle():
 
 
 def released(monkeypatch):
-    """Return an event for which the background waits before it bakes, so that it is late on processors of any
-    speed.
-    """
+    """Return an event for which the background waits before it bakes, so that it is late at any processor speed."""
     event, real = threading.Event(), look_tables.bake
 
     def bake(*given):

@@ -277,7 +277,7 @@ def loaded_on_gpu(monkeypatch, architecture):
 )
 @pytest.mark.usefixtures("gpu_folder")
 def test_kernels_of_a_gpu_of_the_same_generation_are_loaded(monkeypatch, architecture, expected):
-    """Code for a GPU runs on GPUs of the same first number of the compute capability that are not older."""
+    """Code for a GPU runs on GPUs with the same major and the same or a higher minor compute capability."""
     expected_calls = [] if expected is None else [(f"sm_{expected}", expected)]
     assert loaded_on_gpu(monkeypatch, architecture) == (expected is not None, expected_calls)
 

@@ -14,7 +14,7 @@ SIDEBAR_WIDTH = 260  # pixels of the N-panel as Blender opens it
 class Layout:
     """Records drawing calls; properties must exist on their owner, operators, menus and panels be registered.
 
-    `drawn` has everything, as if all panels were open; `folded` the part of it that panels hide until they are opened.
+    `drawn` counts everything, as if all panels were open; `folded` counts properties in panels closed at first.
     """
 
     def __init__(self, whole=None, is_folded=False):

@@ -179,8 +179,8 @@ def test_an_artist_s_compositor_works_on_hair_too(cycles, tmp_path):
 
 
 def test_the_hair_s_scene_follows(cycles):
-    """The scene of the hair follows camera, size, exposure, samples, shutter curve and Time Stretching, and it has hair
-    that is added later.
+    """The scene of the hair follows camera, size, exposure, samples, shutter curve and Time Stretching, and hair that
+    is added later.
     """
     scene = bpy.context.scene
     bpy.ops.vellus.toggle_composite()
