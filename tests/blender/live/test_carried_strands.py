@@ -73,8 +73,8 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
 
 
 def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
-    """Styles are applied before strands are deformed, and strokes and sliders on a bent surface upload no strands and
-    no vertices.
+    """Styles are applied before strands are deformed, and strokes and sliders on a bent surface upload neither
+    strands nor vertices.
     """
     style_items.add(watched.data.vellus, curl.Settings(radius=0.02, pitch=0.1))
     bend(watched.data.surface, 0.3)

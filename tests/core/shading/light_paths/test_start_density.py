@@ -46,7 +46,7 @@ def starts(monkeypatch):
 
 
 def test_hair_that_is_drawn_bright_has_more_paths_and_the_same_light(rng, starts):
-    """Paths of a half that is drawn bright count less. If it is not bright, further paths are those of even density."""
+    """Paths of a half that is drawn bright have less weight. If their light is not, further paths have even density."""
     grid = grid_of(strands_in_a_box(rng), (0.1, 0.3, 1.0), voxel_count=2_500)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
