@@ -124,21 +124,23 @@ def slide(hair, place, name, value):
 def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
     first = drawn(watched)
-    rests, rest = [], style_maker.StyleMaker.rest
+    releases, release = [], style_maker.StyleMaker.release_memory
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
         counted.setattr(following, "strands_now", None)
         slide(watched, 1, "radius", 0.03)
         drawn(watched)
-        monkeypatch.setattr(style_maker.StyleMaker, "rest", lambda self: rests.append(self) or rest(self))
+        monkeypatch.setattr(
+            style_maker.StyleMaker, "release_memory", lambda self: releases.append(self) or release(self)
+        )
         slide(watched, 0, "amount", 0.4)
         comb(3)  # and combing goes on from there
         shown = drawn(watched)
         assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
-    assert not rests  # memory of the slider is released once hair is written
+    assert not releases  # memory of the slider is released once hair is written
     assert np.abs(shown - first).max() > 0.01
     np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
-    assert rests
+    assert releases
     np.testing.assert_array_equal(drawn(watched), shown)
 
 
