@@ -13,6 +13,7 @@ import warp as wp
 
 from ...kernels import kernel_cache
 from ...kernels.checks import require_count
+from .voxel_means import CHANNELS
 
 wp.set_module_options({"enable_backward": False})
 
@@ -79,6 +80,7 @@ def set_levels(levels: wp.array3d[wp.uint8], sums: Sequence[wp.array4d[wp.float6
     for of_hair in sums:
         for side, wanted in zip(of_hair.shape[:3], levels.shape, strict=True):
             require_count("voxels", side, wanted)
+        require_count("channels", of_hair.shape[3], CHANNELS)
     blocks = tuple(-(-side // int(_SIDE)) for side in levels.shape)
     light, even = (wp.zeros(blocks, dtype=wp.float64, device=levels.device) for _ in range(2))
     for of_hair in sums:
@@ -102,7 +104,7 @@ def set_even(levels: wp.array3d[wp.uint8]) -> None:
 def _levels_of(light, even):
     """Return the uint8 levels of blocks with sums of drawn light and of light in uniform light."""
     mean, prior = light.sum() / max(even.sum(), 1e-30), _PRIOR * even.sum()
-    if not (np.isfinite(mean) and mean > 0.0):
+    if not (np.isfinite(mean) and mean > 0.0 and prior > 0.0):
         return np.full(light.shape, int(EVEN), np.uint8)
     density = np.clip((light / mean + prior) / (even + prior), _LEAST, _MOST)
     density /= (density * even).sum() / even.sum()

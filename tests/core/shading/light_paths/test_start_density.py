@@ -27,6 +27,7 @@ def test_the_density_is_that_of_drawn_light_and_one_in_the_mean(rng):
     np.testing.assert_allclose(found[:4] / found[4:], 2.0, rtol=1e-6)
     np.testing.assert_allclose(found.mean(), 1.0, rtol=0.1)  # levels are rounded
     np.testing.assert_array_equal(levels_of(0.0 * light, even), 1.0)  # nothing is drawn
+    np.testing.assert_array_equal(levels_of(light, 0.0 * even), 1.0)  # black in uniform light
     light[:4] = np.inf
     np.testing.assert_array_equal(levels_of(light, even), 1.0)
 
