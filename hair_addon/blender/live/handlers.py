@@ -76,6 +76,7 @@ def after_depsgraph_update(scene, depsgraph):
         simulated_hair.show_known(
             [guides for guides in frame_folders.simulating() if guides in copies], scene, depsgraph
         )
+    simulated_hair.show_waiting(scene, depsgraph)
     _follow_painting(reports, {surface for surface in deformed if surface.data in changed}, depsgraph)
     combed = _follow_geometry(changed, depsgraph)
     stroke_limits.begin({u.datablock for u in reports if u.is_of(bpy.types.Object)} - {None})

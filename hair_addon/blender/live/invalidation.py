@@ -69,6 +69,7 @@ COPIES = (
     animated.value_cache,
     usable_surfaces.inside_out_cache,
     simulated_guides.point_cache,
+    simulated_hair.waiting_cache,
     last_update.guide_cache,
     last_update.former_cache,
     last_update.painting_cache,

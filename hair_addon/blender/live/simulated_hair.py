@@ -44,6 +44,9 @@ class _Played:
 
 played_cache = Cache()  # session_uid of guide Curves → _Played
 
+# session_uid of guide Curves on a surface of another scene → True until an update of that scene shows them
+waiting_cache = Cache()
+
 
 def follow_frame(blender_scene, depsgraph):
     """Move all simulated guides and their hair to the scene's time.
@@ -118,14 +121,30 @@ def note_combed(combed, blender_scene):
 
 
 def show_known(simulating, blender_scene, depsgraph):
-    """Show simulated guides of a scene at their known points. Loading, copying, undo and redo show them as combed."""
-    for guides in _of_scene(simulating, depsgraph):
+    """Show simulated guides at their known points. Loading, copying, undo and redo show them as combed.
+
+    Guides on surfaces of other scenes wait for updates of these scenes.
+    """
+    here = _of_scene(simulating, depsgraph)
+    for guides in simulating:
+        waiting_cache.keep(guides.session_uid, True)
+    for guides in here:
+        waiting_cache.invalidate(guides.session_uid)
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
             _note_state(guides, blender_scene)
             _require_readable(guides, scene_time.time_of(blender_scene))
         except HairError as error:
             guides.vellus.dynamics_status = str(error)
+
+
+def show_waiting(blender_scene, depsgraph):
+    """Show the guides that `show_known` left to an update of their scene."""
+    if len(waiting_cache):
+        waiting = [guides for guides in frame_folders.simulating() if waiting_cache.get(guides.session_uid)]
+        here = _of_scene(waiting, depsgraph)
+        if here:
+            show_known(here, blender_scene, depsgraph)
 
 
 def _follow_known(guides, blender_scene, depsgraph):

@@ -9,7 +9,7 @@ from hair_addon.blender.data.simulation import guide_poses
 from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import running
-from hair_addon.blender.live import dynamics_state, invalidation, live_hair
+from hair_addon.blender.live import dynamics_state, handlers, invalidation, live_hair
 from hair_addon.core.files.frame_cache import FrameCache
 from hair_addon.core.long_work import run_now
 from tests.support.dynamics.swung import SWINGS, simulate, swing
@@ -229,3 +229,18 @@ def test_frames_of_other_scenes_move_no_guides(swung):
         other.frame_set(frame)
         np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), shown)
     np.testing.assert_array_equal([shown, played(guides, 7, 7)], expected)
+
+
+def test_guides_of_another_scene_are_shown_by_its_next_update_after_undo(swung):
+    """An undo while another scene is shown reports no update of the guides' scene."""
+    guides, _hair = swung
+    sixth = played(guides)
+    other, empty = bpy.data.scenes.new("Other"), bpy.data.objects.new("Empty", None)
+    other.collection.objects.link(empty)
+    other.view_layers[0].update()
+    handlers.after_undo()
+    empty.location.x = 1.0
+    other.view_layers[0].update()
+    guides.update_tag()
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), sixth)
