@@ -44,7 +44,6 @@ def load(module: "wp.Module", device: "wp.Device") -> bool:
     try:
         module.load(device, block_dim=block_dim, output_arch=architecture_of(kind), **files)
     except Exception:  # Warp raises nothing more specific if the driver refuses the code
-        module.unload()
         return False
     return True
 

@@ -290,7 +290,9 @@ def test_kernels_of_gpus_that_do_not_fit(gpu_folder, monkeypatch):
         raise Exception("CUDA error")
 
     monkeypatch.setattr(module, "load", refuse)
+    monkeypatch.setitem(module.execs, "of the CPU", None)
     assert not compiled_kernels.load(module, SimpleNamespace(is_cpu=False, arch=90))
+    assert "of the CPU" in module.execs
     path = gpu_folder / "sm_90" / "core.geometry.curves.bspline.cubin"
     path.write_bytes(path.read_bytes()[:-1])
     assert loaded_on_gpu(monkeypatch, 90) == (False, [])
