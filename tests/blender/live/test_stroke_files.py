@@ -18,7 +18,8 @@ ALONG = "core/geometry/strands.py"
 @pytest.fixture
 def watched(hair, monkeypatch):
     """Return hair shown in a window, one of whose guides was combed before."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
+    for name in ("has_window", "may_wait"):
+        monkeypatch.setattr(running, name, lambda: True)
     hair_cache.strands_on_gpu(hair.data)
     comb(1)
     hair_cache.strands_on_gpu(hair.data)
