@@ -114,8 +114,8 @@ def test_a_pose_uploads_places_around_roots_and_nothing_else(blender, rooted, mo
     strands, sent = carrier.carry(uploaded(points[near]), moved), []
     buffer = gpu.types.Buffer
     monkeypatch.setattr(gpu.types, "Buffer", lambda kind, size, values: sent.append(size) or buffer(kind, size, values))
-    for _ in range(3):
-        strands = carrier.carry(strands, moved)
+    for turn in range(3):
+        strands = carrier.carry(strands, bent(vertices, 3.5 + 0.5 * turn))
     assert vertices[turning.needed, 0].max() <= 0.4 + 2.0 / (SIDE - 1)  # those of the faces around corners of roots
     assert sent == [3 * len(turning.needed)] * 3
 
