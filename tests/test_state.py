@@ -54,6 +54,7 @@ PURE = {
     "core/geometry/curves/bspline.py: _device_matrix",
     "core/geometry/curves/bspline.py: _controls_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
+    "core/kernels/compiled_kernels.py: _fitting_gpu",
     "core/maps/pixels.py: _linear_bytes",
     "core/maps/varied_settings.py: all_varied",
     "core/maps/varied_settings.py: of_styles",
