@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ....core.errors import HairError, cause_of
-from ...data.pictures import light_panoramas, shader_sockets, unsaved_images
+from ...data.pictures import light_panoramas, shader_sockets
 from ...host import scene_time
 from . import world_panorama
 
@@ -31,7 +30,8 @@ def render(path, name, matrix, frame, is_coarse, out):
     directions of the light's own axes, from below to above. A sun lights the sphere through its wall. is_coarse: render
     a small picture in less time.
     """
-    scene, light, tree = _load_light(path, name, Path(out).parent)
+    light = world_panorama.load(path, "lights", name, Path(out).parent)
+    scene, tree = bpy.context.scene, light.node_tree
     for setting, value in _PLAIN.items():
         setattr(light, setting, value)
     world_panorama.replace_light_paths(tree, set())
@@ -55,24 +55,6 @@ def render(path, name, matrix, frame, is_coarse, out):
     np.savez(part.with_suffix(".npz"), lit=lit, plain=plain.mean(axis=-1))
     part.unlink()
     os.replace(part.with_suffix(".npz"), out)
-
-
-def _load_light(path, name, folder):
-    """Open an empty file, load a light of a .blend and return (scene, light, node tree). Raises `HairError`.
-
-    folder: contains unsaved images.
-    """
-    try:
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path)) as (_found, wanted):
-            wanted.lights = [name]
-        unsaved_images.restore(folder)
-        scene = bpy.context.scene
-        scene.render.engine = "CYCLES"
-        (light,) = wanted.lights
-        return scene, light, light.node_tree
-    except (OSError, RuntimeError, TypeError, ValueError, AttributeError) as error:
-        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
 
 
 def _add_lamp(scene, light, matrix):

@@ -56,16 +56,8 @@ def _opened(path, name, digest, frame, folder):
     Cycles keeps the data of the world for the next picture of the same scene. The table of a Sky Texture takes most of
     the time of a coarse picture.
     """
-    try:
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        with bpy.data.libraries.load(str(path)) as (_found, wanted):
-            wanted.worlds = [name]
-        unsaved_images.restore(folder)
-        scene = bpy.context.scene
-        (scene.world,) = filter(None, wanted.worlds)
-        scene.render.engine = "CYCLES"
-    except (OSError, RuntimeError, TypeError, ValueError) as error:
-        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
+    world, scene = load(path, "worlds", name, folder), bpy.context.scene
+    scene.world = world
     replace_light_paths(scene.world.node_tree, set())
     scene.world.cycles.sampling_method = "NONE"  # the importance map would take most of the time
     add_camera(scene)
@@ -73,6 +65,23 @@ def _opened(path, name, digest, frame, folder):
     scene.render.use_persistent_data = True
     scene[_NODES] = [digest, str(frame)]
     return scene
+
+
+def load(path, kind, name, folder):
+    """Open an empty file for Cycles, and return a datablock of a .blend that is loaded into it. Raises `HairError`.
+
+    kind: "worlds" or "lights"; folder: contains unsaved images.
+    """
+    try:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        with bpy.data.libraries.load(str(path)) as (_found, wanted):
+            setattr(wanted, kind, [name])
+        unsaved_images.restore(folder)
+        bpy.context.scene.render.engine = "CYCLES"
+        (datablock,) = filter(None, getattr(wanted, kind))
+        return datablock
+    except (OSError, RuntimeError, TypeError, ValueError) as error:
+        raise HairError(f"{path} cannot be rendered: {cause_of(error)}.") from error
 
 
 def picture(scene, path):
