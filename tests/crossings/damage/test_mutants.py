@@ -58,8 +58,7 @@ OTHERS = {
     "blender/io/pictures/background_jobs.py": "jobs of the process that started it",
     "blender/io/pictures/surface_bake.py": "the surfaces that another process has written for it",
     "blender/data/pictures/light_panoramas.py": "panoramas that another process has written; damaged ones are removed",
-    "blender/io/pictures/light_panorama.py": "the light that another process has written for it",
-    "blender/io/pictures/world_panorama.py": "the world that another process has written for it",
+    "blender/io/pictures/world_panorama.py": "the world or light that another process has written for it",
 }
 
 
