@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core import geometry, grooming
-from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.errors import HairError
 from ..core.files.curve_file import TO_Z_UP, Convention, parsed_unit
 from ..core.geometry.mesh import TriMesh
@@ -18,6 +17,7 @@ from ..core.grooming import groom
 from ..core.grooming.derived_guides import DerivationSettings
 from ..core.grooming.transfer_settings import TransferSettings
 from ..core.long_work import Progress, no_progress, run_now
+from ..core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 from .arguments import are_arrays, changed, checked_progress, choice, curves_object_of, mesh_of, path_of
 from .blender_access import blender
 

@@ -2,9 +2,9 @@
 """Options of commands that read curves from a file: selection, unit and up axis."""
 
 from ..core import lazy
-from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.errors import HairError
 from ..core.files.curve_file import ENDINGS, UNITS, Convention, parsed_unit
+from ..core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 from ..core.params import declared
 
 _ROOT_ENDS = next(d.choices for name, _default, d in declared(MeshStrandSettings) if name == "root_end")

@@ -6,11 +6,11 @@ import time
 from dataclasses import replace
 
 from ..core import lazy
-from ..core.cards.mesh_strand_settings import MeshStrandSettings
 from ..core.errors import HairError
 from ..core.grooming.derived_guides import DerivationSettings
 from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
+from ..core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 from ..core.params import declared
 from ..core.shading.presets import PRESETS
 from . import curve_options, import_mesh, map_options, opening, options, style_options

@@ -9,14 +9,14 @@ import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core import maps
-from ...core.cards import mesh_strands
-from ...core.cards.mesh_strand_settings import MeshStrandSettings
 from ...core.errors import HairError
 from ...core.files.curve_file import CurveSet
 from ...core.geometry.mesh import TriMesh
 from ...core.grooming.derived_guides import DerivationSettings
 from ...core.long_work import Work, part_of
 from ...core.maps.map_settings import MapSettings
+from ...core.mesh_hair import mesh_strands, piece_strands, surface_roots, texture_alpha
+from ...core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 from ...core.params import Param, plain_value
 from ..data import scene, usable_surfaces, whole_changes
 from ..data.made import made_meshes
@@ -99,13 +99,13 @@ def _strands_of(mesh, surface, pieces, settings, progress):
     """Return the `MeshStrands` of a mesh in the world, and their linear colors (S, 3), None without colors."""
     alpha_at = pieces.alphas if settings.uses_alpha and pieces.has_alpha else None
     reading = part_of(progress, 0.0, 0.5)
-    found = mesh_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, reading, alpha_at)
+    found = piece_strands.mesh_strands(mesh, surface, settings, pieces.corner_uvs, reading, alpha_at)
     if alpha_at is not None:
-        found = mesh_strands.shown(found, alpha_at(found.places), alpha_at, mesh)
+        found = texture_alpha.shown(found, alpha_at(found.places), alpha_at, mesh)
     colored = pieces.colors(found.places)
     means = mesh_strands.root_to_tip_means(found, colored) if pieces.has_colors else None
     if settings.reaches_surface:
-        found = mesh_strands.on_surface(found, surface)
+        found = surface_roots.on_surface(found, surface)
     return found, None if means is None else maps.pixels.unpremultiplied(means)[0]
 
 

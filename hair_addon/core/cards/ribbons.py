@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import geometry
+from ..geometry.curves import curve_frames
 from ..geometry.mesh import TriMesh, interpolate
 from ..geometry.search import clusters
-from . import curve_frames
 
 _WINDOW = 0.3  # of the length: keeps strands in order along ribbons that return to themselves
 _TINY = 1e-9

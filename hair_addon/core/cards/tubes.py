@@ -4,8 +4,8 @@
 import numpy as np
 
 from ..errors import HairError
+from ..geometry.curves import curve_frames
 from ..geometry.mesh import Faces
-from . import curve_frames
 from .card_settings import TubeSettings
 from .polygon_mesh import PolygonMesh
 

@@ -5,7 +5,8 @@ import itertools
 
 import numpy as np
 
-from hair_addon.core.cards import curve_frames, outlines, ribbons
+from hair_addon.core.cards import outlines, ribbons
+from hair_addon.core.geometry.curves import curve_frames
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.core.cards.conftest import COUNT, SEGMENTS, sphere
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import bpy
 
-from ....core.cards.mesh_strand_settings import MeshStrandSettings
 from ....core.errors import HairError
 from ....core.files.curve_file import ENDINGS, UNITS, Convention
 from ....core.grooming import cost
@@ -15,6 +14,7 @@ from ....core.grooming.derived_guides import DerivationSettings
 from ....core.grooming.groom import HairSettings
 from ....core.grooming.transfer_settings import TransferSettings
 from ....core.long_work import Stage, no_progress
+from ....core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 from ... import io
 from ...data import scene
 from ...groom.foreign import foreign_meshes, hand_made_guides, joined_curves, kept_hair, particle_hair

@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ...lazy import submodules
 
 if TYPE_CHECKING:
-    from . import bezier_segments, bspline, resampling
+    from . import bezier_segments, bspline, curve_frames, resampling
 else:
     __getattr__ = submodules(__name__)

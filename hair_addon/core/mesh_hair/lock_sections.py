@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry import surface_distance
+from ..geometry.curves import curve_frames
 from ..geometry.mesh import TriMesh
-from . import curve_frames
 from .mesh_pieces import Topology
 from .ribbon_charts import divided
 

@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import alpha_paths, mesh_strands
-from hair_addon.core.cards.mesh_strand_settings import MeshStrandSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.mesh_hair import alpha_paths, piece_strands, texture_alpha
+from hair_addon.core.mesh_hair.mesh_strand_settings import MeshStrandSettings
 
 FLOOR = TriMesh(
     np.array([(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)], np.float32), np.array([(0, 1, 2), (0, 2, 3)])
@@ -50,8 +50,8 @@ def strands_of(alpha, scale=(1.0, 1.0, 1.0), **settings):
         return looked_up(alpha, np.einsum("nc,ncu->nu", places.barycentric, uvs[places.triangle]))
 
     chosen = MeshStrandSettings(root_end="LOW_V", **settings)
-    found = mesh_strands.mesh_strands(mesh, FLOOR, chosen, uvs, alpha_at=alpha_at)
-    return mesh_strands.shown(found, alpha_at(found.places), alpha_at, mesh)
+    found = piece_strands.mesh_strands(mesh, FLOOR, chosen, uvs, alpha_at=alpha_at)
+    return texture_alpha.shown(found, alpha_at(found.places), alpha_at, mesh)
 
 
 def covered(found, scale):
@@ -101,8 +101,8 @@ def test_few_strands_stay_on_fine_locks(slope, least):
 
 def test_an_opaque_texture_changes_nothing():
     mesh, uvs = card()
-    plain = mesh_strands.mesh_strands(mesh, FLOOR, MeshStrandSettings(strand_count=10), uvs)
-    found = mesh_strands.mesh_strands(
+    plain = piece_strands.mesh_strands(mesh, FLOOR, MeshStrandSettings(strand_count=10), uvs)
+    found = piece_strands.mesh_strands(
         mesh, FLOOR, MeshStrandSettings(strand_count=10), uvs, alpha_at=lambda places: np.ones(len(places))
     )
     np.testing.assert_array_equal(found.points, plain.points)

@@ -6,13 +6,15 @@ import itertools
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import curve_frames, mesh_strands, outlines, ribbon_charts, tubes
+from hair_addon.core.cards import outlines, tubes
 from hair_addon.core.cards.card_settings import TubeSettings
-from hair_addon.core.cards.mesh_strand_settings import MeshStrandSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.closest_point import SurfaceQuery
+from hair_addon.core.geometry.curves import curve_frames
 from hair_addon.core.geometry.mesh import TriMesh, positions
-from tests.core.cards.conftest import sphere
+from hair_addon.core.mesh_hair import piece_strands, ribbon_charts, surface_roots, texture_alpha
+from hair_addon.core.mesh_hair.mesh_strand_settings import MeshStrandSettings
+from tests.core.cards.conftest import carded, sphere  # noqa: F401
 from tests.support.meshes import flat_grid
 
 FLOOR = TriMesh(
@@ -55,7 +57,7 @@ def joined(*meshes):
 
 
 def made(mesh, surface=FLOOR, uvs=None, **settings):
-    return mesh_strands.mesh_strands(mesh, surface, MeshStrandSettings(**settings), uvs)
+    return piece_strands.mesh_strands(mesh, surface, MeshStrandSettings(**settings), uvs)
 
 
 def strands_of(found):
@@ -93,7 +95,7 @@ def test_strands_keep_their_place_across_a_card():
     np.testing.assert_allclose(positions(mesh, found.places), found.points, atol=1e-6)
 
 
-def test_cards_of_strands_become_strands_within_the_width_of_their_cards(carded):
+def test_cards_of_strands_become_strands_within_the_width_of_their_cards(carded):  # noqa: F811
     """Cards of clumps of hair give strands that are as near to the strands of their clump as the card is wide, and that
     begin where the clump begins.
     """
@@ -221,14 +223,14 @@ def test_strands_begin_on_the_surface(height):
     """Strands that begin below the surface are cut there, strands that begin above it are extended; tips stay."""
     mesh, _ = card(1, shifted(z=height))
     before = made(mesh, strand_count=6)
-    found = mesh_strands.on_surface(before, FLOOR)
+    found = surface_roots.on_surface(before, FLOOR)
     roots, tips = found.points[found.starts[:-1]], found.points[found.starts[1:] - 1]
     np.testing.assert_allclose(roots[:, 2], 0.0, atol=1e-7)
     np.testing.assert_array_equal(tips, before.points[before.starts[1:] - 1])
     assert all((points[1:, 2] > 0.0).all() for points in strands_of(found))
     assert len(found.radii) == len(found.points) == found.counts.sum() == len(found.places)
     far = made(card(1, shifted(z=1.0))[0], strand_count=6)
-    np.testing.assert_array_equal(mesh_strands.on_surface(far, FLOOR).points, far.points)
+    np.testing.assert_array_equal(surface_roots.on_surface(far, FLOOR).points, far.points)
 
 
 def test_strands_begin_on_a_surface_with_normals_inward():
@@ -237,8 +239,8 @@ def test_strands_begin_on_a_surface_with_normals_inward():
     inward = TriMesh(ball.vertices, ball.triangles[:, ::-1].copy())
     top = float(ball.vertices[:, 2].max())
     mesh = card(1, curve(9, (0.0, 0.0, top - 0.1)))[0]
-    expected = mesh_strands.on_surface(made(mesh, ball, strand_count=5), ball)
-    found = mesh_strands.on_surface(made(mesh, ball, strand_count=5), inward)
+    expected = surface_roots.on_surface(made(mesh, ball, strand_count=5), ball)
+    found = surface_roots.on_surface(made(mesh, ball, strand_count=5), inward)
     assert not np.array_equal(expected.counts, made(mesh, ball, strand_count=5).counts)
     np.testing.assert_array_equal(found.counts, expected.counts)
     np.testing.assert_allclose(found.points, expected.points, atol=1e-5)
@@ -257,12 +259,12 @@ def test_strands_end_where_the_texture_ends():
 
     alpha = alpha_at(found.places).reshape(10, -1)
     alpha[3:5] = 0.0
-    ended = mesh_strands.shown(found, alpha.ravel(), alpha_at, mesh)
+    ended = texture_alpha.shown(found, alpha.ravel(), alpha_at, mesh)
     assert len(ended.counts) == 8
     step = points[0, 5, 2] - points[0, 4, 2]
     np.testing.assert_allclose(ended.points[ended.starts[1:] - 1, 2], end, atol=0.15 * step)
     with pytest.raises(HairError, match="transparent"):
-        mesh_strands.shown(found, np.zeros(len(found.points)), alpha_at, mesh)
+        texture_alpha.shown(found, np.zeros(len(found.points)), alpha_at, mesh)
 
 
 def test_cards_share_strands_by_their_area():
