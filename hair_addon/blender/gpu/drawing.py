@@ -134,9 +134,11 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
 
 
 def strand_records(strands, view, to_world, steps=_ALL):
-    """Return (N,) `strand_record`s of `StrandsOnGPU` at places (N, 4, 4); steps: with numbers or arrays (N,)."""
-    records, matrices = np.repeat(view[None], len(to_world)), to_world.transpose(0, 2, 1)
-    records["object_to_world"], records["object_to_clip"] = matrices, matrices @ view["world_to_clip"]
+    """Return (..., N) `strand_record`s of `StrandsOnGPU` at places (N, 4, 4) in (...) views; steps: with numbers or
+    arrays that are broadcast to (..., N).
+    """
+    records, matrices = np.repeat(view[..., None], len(to_world), axis=-1), to_world.transpose(0, 2, 1)
+    records["object_to_world"], records["object_to_clip"] = matrices, matrices @ view["world_to_clip"][..., None, :, :]
     records["object_scale"] = scales_of(to_world)
     records["strand_count"], records["point_count"] = strands.strand_count, strands.point_count
     for name, wanted, most in (
@@ -196,24 +198,36 @@ WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
 FIRST_SHARE = 8
 
 
-def rasterize_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
-    """Run a compute program that rasterizes the segments of strands; record: of `strand_record`.
+@contextmanager
+def rasterizing(program, blocks, samplers, images, constants, part=WALK_ALL):
+    """Bind a compute program that rasterizes segments, for calls of `rasterize_strands`; binding takes longer than a
+    dispatch.
 
-    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that the
-    program reads and writes; constants: {name: int}; part: `WALK_ALL` of the strands, `WALK_FIRST` or the remaining
-    `WALK_OTHERS`.
+    blocks: {instance: GPUUniformBuf} of all strands; samplers, images: {name: texture} that the program reads and
+    writes; constants: {name: int}; part: `WALK_ALL` of the strands, `WALK_FIRST` or the remaining `WALK_OTHERS`.
+    """
+    with bound(program, blocks, samplers):
+        for name, texture in images.items():
+            program.image(name, texture)
+        set_integers(program, constants)
+        program.uniform_int("walked_part", part)
+        yield
+
+
+def rasterize_strands(strands, program, record, blocks, constants, part=WALK_ALL):
+    """Rasterize strands by a program of `rasterizing`; record: of `strand_record`.
+
+    blocks: {instance: GPUUniformBuf} of these strands, the record as "view"; constants: {name: int} of these strands;
+    part: as for `rasterizing`.
     """
     strand_count = int(record["drawn_strands"])
     first_count = -(-strand_count // FIRST_SHARE)
     walked = (strand_count, first_count, strand_count - first_count)[part]
     if not walked:
         return
-    with bound(program, blocks, {**strand_samplers(strands), **samplers}):
-        for name, texture in images.items():
-            program.image(name, texture)
-        for name, value in (constants | {"walked_part": part}).items():
-            program.uniform_int(name, value)
-        run_for_each(program, walked * runs_of_strand(record), scene_programs.RUN_GROUP_SIZE)
+    provide(program, blocks, strand_samplers(strands))
+    set_integers(program, constants)
+    run_for_each(program, walked * runs_of_strand(record), scene_programs.RUN_GROUP_SIZE)
 
 
 def dispatch_over(program, size, group_size=(scene_programs.PICTURE_GROUP_SIZE,) * 2):
@@ -230,12 +244,23 @@ def bound(program, blocks, samplers):
     would take a new program at the same address for bound, and draw with the old one.
     """
     program.bind()
+    provide(program, blocks, samplers)
+    yield
+    gpu.shader.unbind()
+
+
+def provide(program, blocks, samplers):
+    """Set blocks {instance: GPUUniformBuf} and textures {sampler: GPUTexture} of a bound program."""
     for name, block in blocks.items():
         program.uniform_block(name, block)
     for name, texture in samplers.items():
         program.uniform_sampler(name, texture)
-    yield
-    gpu.shader.unbind()
+
+
+def set_integers(program, constants):
+    """Set constants {name: int} of a bound program."""
+    for name, value in constants.items():
+        program.uniform_int(name, value)
 
 
 def draw_cover(program, blocks, samplers):

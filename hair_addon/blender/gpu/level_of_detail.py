@@ -69,23 +69,25 @@ def _steps(strands, to_world, limits, view):
 
 
 def points_within(strands, to_world, view, bend):
-    """Return (N,) minimum numbers of evenly chosen points with which `StrandsOnGPU` at (N, 4, 4) places deviate by at
-    most `bend` [samples] from their curves in a view.
+    """Return (..., N) minimum numbers of evenly chosen points with which `StrandsOnGPU` at (N, 4, 4) places deviate by
+    at most `bend` [samples] from their curves in (...) views.
     """
+    if not strands.has_bends:  # all points, whatever their size
+        return strands.point_count
     samples_per_unit, _diameters = _sizes_in(view, strands, to_world)
     lengths = strands.mean_length * samples_per_unit * drawing.scales_of(to_world)
     return _points_that_show(strands, lengths, bend, 2)
 
 
 def _points_that_show(strands, lengths, bend, least):
-    """Return (N,) minimum numbers of evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by at
-    most `bend` [samples] from their curves; lengths: (N,) of strands [samples].
+    """Return (..., N) minimum numbers of evenly chosen points, at least `least`, with which `StrandsOnGPU` deviate by
+    at most `bend` [samples] from their curves; lengths: (..., N) of strands [samples].
 
     Returns all points if only the GPU knows how strands bend. An arc of a parabola over a chord c with a sagitta s is
     longer than the chord by the fraction 8/3 (s / c)².
     """
-    pieces, enough = strands.point_count - 1, np.full(len(lengths), strands.point_count)
-    are_shown = np.ones(len(lengths), bool)
+    pieces, enough = strands.point_count - 1, np.full(lengths.shape, strands.point_count)
+    are_shown = np.ones(lengths.shape, bool)
     for step in range(2, pieces // (least - 1) + 1 if strands.has_bends else 0):
         if pieces % step:
             continue
@@ -99,17 +101,17 @@ def _points_that_show(strands, lengths, bend, least):
 
 
 def _sizes_in(view, strands, to_world):
-    """Return (N,) samples per unit at the nearest strand and (N,) diameters [samples] of `StrandsOnGPU` at (N, 4, 4)
-    places.
+    """Return (..., N) samples per unit at the nearest strand and (..., N) diameters [samples] of `StrandsOnGPU` at
+    (N, 4, 4) places in (...) views.
 
     The diameter of hair with an uneven scale is measured along the axis with the smallest scale. Both numbers are very
     large if the viewer is inside of the hair's sphere.
     """
     centres, radii = drawing.bounding_spheres(strands, to_world)
-    per_unit = np.full(len(to_world), float(view["pixels_per_unit"]))
-    if view["is_perspective"]:
-        distances = np.linalg.norm(view["eye"][:3] - centres, axis=1) - radii
-        per_unit = np.divide(per_unit, distances, out=np.full(len(to_world), _INSIDE), where=distances > 0.0)
+    distances = np.linalg.norm(view["eye"][..., None, :3] - centres, axis=-1) - radii
+    per_unit = np.repeat(view["pixels_per_unit"].astype(np.float64)[..., None], len(to_world), axis=-1)
+    nearest = np.divide(per_unit, distances, out=np.full(per_unit.shape, _INSIDE), where=distances > 0.0)
+    per_unit = np.where(view["is_perspective"][..., None] != 0, nearest, per_unit)
     scales = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
     unevenness = np.divide(scales[:, 2], scales[:, 0], out=np.ones(len(scales)), where=scales[:, 0] > 0.0)
     return per_unit, 2.0 * radii * per_unit * unevenness

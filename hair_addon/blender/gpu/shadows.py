@@ -3,6 +3,7 @@
 
 import weakref
 from dataclasses import replace
+from itertools import groupby
 
 import gpu
 import numpy as np
@@ -98,13 +99,11 @@ class ShadowMaps:
                 view["light_index"] = index
                 views[index] = view
         if views:
-            light_block, linked = uniforms.uniform_buffer(lights), _linked(hair)  # each map only reads its own light
+            light_block = uniforms.uniform_buffer(lights)  # each map only reads its own light
+            casts = {index: (hair, surfaces) if casters is None else casters(index) for index in views}
+            all_placed = _placed(views, casts, steps, is_steady, counted)
             for index, view in views.items():
-                cast = (linked, surfaces)
-                if casters is not None:
-                    casting, blocking = casters(index)
-                    cast = _linked(casting), blocking
-                self._draw_light(index, view, lights, light_block, *cast, steps, is_steady, counted)
+                self._draw_light(index, view, lights, light_block, all_placed[index], casts[index][1])
 
     def _aimed(self, index, light, hair, loose):
         """`_aim`, cached while the light and the sphere stay the same."""
@@ -125,12 +124,8 @@ class ShadowMaps:
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
 
-    def _draw_light(self, layer, view, lights, light_block, linked, surfaces, steps, is_steady, counted):
+    def _draw_light(self, layer, view, lights, light_block, placed, surfaces):
         hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
-        placed = []
-        for strands, to_world in linked:
-            records = _records(strands, view, to_world, steps, is_steady)
-            placed.append((strands, records, _fewer(records, counted)))
         drawn_with = self._new_strands(layer, view, lights, placed)
         if drawn_with is None:
             return
@@ -212,7 +207,7 @@ class ShadowMaps:
     def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs, with integer sums that do not depend on the order.
 
-        placed: [(StrandsOnGPU, (N,) records, (N,) records of counted strands)].
+        placed: as from `_placed`.
         """
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
@@ -226,14 +221,15 @@ class ShadowMaps:
             for bound, (strands, records, counted) in zip(bounding, placed, strict=True)
         ]
         for is_front in (True, False):
-            for strands, record, objects, view in bounding if is_front else counting:
-                program = scene_programs.strand_shadow_program(is_front, objects is not None)
-                if objects is None:
-                    blocks = {"view": view, "lights": lights}
-                    drawing.rasterize_strands(strands, program, record, blocks, samplers, images, {})
-                else:
-                    blocks = {"shared_view": view, "lights": lights}
-                    objects.rasterize(strands, program, blocks, samplers, images, {})
+            drawn = bounding if is_front else counting
+            for is_batch, some in groupby(drawn, key=lambda one: one[2] is not None):
+                program = scene_programs.strand_shadow_program(is_front, is_batch)
+                with drawing.rasterizing(program, {"lights": lights}, samplers, images, {}):
+                    for strands, record, objects, view in some:
+                        if objects is None:
+                            drawing.rasterize_strands(strands, program, record, {"view": view}, {})
+                        else:
+                            objects.rasterize(strands, program, {"shared_view": view}, {})
             if is_front:
                 self._fill_fronts(layer)
         self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
@@ -320,16 +316,37 @@ def _linked(hair):
     return [(hair[group[0]][0], np.stack([hair[index][1] for index in group])) for group in groups]
 
 
-def _records(strands, view, to_world, steps, is_steady):
-    """Return `drawing.strand_records` of strands, thickened to compensate for the length that fewer points lose.
+def _placed(views, casts, steps, is_steady, counted):
+    """Return {light's index: [(StrandsOnGPU, (N,) `_records`, (N,) records of counted strands)]}.
+
+    views: {light's index: view}; casts: {light's index: (hair, surfaces)}; the rest as for `ShadowMaps.draw`. Records
+    of lights with the same hair are computed together, as each call has a cost.
+    """
+    found, indices = {}, list(views)
+    for group in strand_batches.groups_of(tuple(map(id, casts[index][0])) for index in indices):
+        chosen = [indices[place] for place in group]
+        seen_from = np.stack([views[index] for index in chosen])
+        each = []
+        for strands, to_world in _linked(casts[chosen[0]][0]):
+            records = _records(strands, seen_from, to_world, steps, is_steady)
+            each.append((strands, records, _fewer(records, counted)))
+        for place, index in enumerate(chosen):
+            found[index] = [(strands, *(records[place] for records in both)) for strands, *both in each]
+    return found
+
+
+def _records(strands, views, to_world, steps, is_steady):
+    """Return (V, N) `drawing.strand_records` of strands in (V,) views, thickened to compensate for the length that
+    fewer points lose.
 
     Strands at rest, or that only follow their surface, are drawn with the fewest points that show them.
     """
     if steps.point_count is None and (not is_steady or not strands.has_points):
-        steps = replace(steps, point_count=level_of_detail.points_within(strands, to_world, view, _GREATEST_BEND))
-    records = drawing.strand_records(strands, view, to_world, steps)
-    for index in np.flatnonzero(records["drawn_points"] < strands.point_count):
-        records["thickness"][index] *= strands.lengthening(int(records["drawn_points"][index]))
+        steps = replace(steps, point_count=level_of_detail.points_within(strands, to_world, views, _GREATEST_BEND))
+    records = drawing.strand_records(strands, views, to_world, steps)
+    drawn_points = records["drawn_points"]
+    for count in set(drawn_points.ravel().tolist()) - {strands.point_count}:
+        records["thickness"][drawn_points == count] *= strands.lengthening(count)
     return records
 
 

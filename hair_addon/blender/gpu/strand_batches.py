@@ -100,16 +100,13 @@ class Objects:
         )
         self.count, self.last_segment = len(records), first + strand_count * (points - 1) - 1
 
-    def rasterize(self, strands, program, blocks, samplers, images, constants, part=drawing.WALK_ALL):
-        """Run a compute program that rasterizes the segments of all objects; see `drawing.rasterize_strands`."""
+    def rasterize(self, strands, program, blocks, constants, part=drawing.WALK_ALL):
+        """Rasterize the segments of all objects by a program of `drawing.rasterizing`; see `rasterize_strands`."""
         if not self._group_counts[part]:
             return
-        with drawing.bound(program, blocks, {**drawing.strand_samplers(strands), **samplers, "objects": self.texture}):
-            for name, texture in images.items():
-                program.image(name, texture)
-            for name, value in (constants | {"object_count": self.count, "walked_part": part}).items():
-                program.uniform_int(name, value)
-            run_for_each(program, int(self._group_counts[part]), 1)
+        drawing.provide(program, blocks, {**drawing.strand_samplers(strands), "objects": self.texture})
+        drawing.set_integers(program, constants | {"object_count": self.count})
+        run_for_each(program, int(self._group_counts[part]), 1)
 
 
 def objects_of(records):

@@ -8,6 +8,7 @@ If the graphics driver supports it, a compute program also finds the nearest seg
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import gpu
 import numpy as np
@@ -423,17 +424,18 @@ class VisibilityBuffer:
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
-        samplers, constants = {"farthest_depths": self._farthest}, {"are_tiles_known": int(are_tiles_known)}
-        for placed, blocks in zip(self._hair, all_blocks, strict=True):
-            strands, objects = placed.batch.strands, placed.objects
-            kind = is_depth, placed.is_round, self._clip_planes is not None, objects is not None
-            arguments = scene_programs.segments_program(*kind), blocks, samplers, images, constants, part
-            if objects is not None:
-                objects.rasterize(strands, *arguments)
-                continue
-            program, *others = arguments
-            others[3] = constants | {"first_run": placed.first_run}
-            drawing.rasterize_strands(strands, program, placed.records[0], *others)
+        shared = {"farthest_depths": self._farthest}, images, {"are_tiles_known": int(are_tiles_known)}, part
+        drawn = zip(self._hair, all_blocks, strict=True)
+        for kind, some in groupby(drawn, key=lambda one: (one[0].is_round, one[0].objects is not None)):
+            is_round, is_batch = kind
+            program = scene_programs.segments_program(is_depth, is_round, self._clip_planes is not None, is_batch)
+            with drawing.rasterizing(program, {}, *shared):
+                for placed, blocks in some:
+                    strands, first_run = placed.batch.strands, {"first_run": placed.first_run}
+                    if is_batch:
+                        placed.objects.rasterize(strands, program, blocks, {}, part)
+                    else:
+                        drawing.rasterize_strands(strands, program, placed.records[0], blocks, first_run, part)
 
     def nearest_depths(self):
         """`depths` of hair, and of surfaces elsewhere."""

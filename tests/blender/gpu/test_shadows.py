@@ -334,3 +334,29 @@ def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng
     arcs = np.stack([0.2 * np.sin(turn), 0.0 * turn, 0.2 * np.cos(turn)], axis=-1)
     counts = [drawn_points(arcs, size) for size in (64, 512)]
     assert 4 <= counts[0] < counts[1] <= 31
+
+
+def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatch):
+    """Records of hair in the maps of several lights have the same bits as those for each light alone."""
+    points, radii = tuft(rng, 300)
+    many, few = (strand_textures.upload_strands(points[:count], radii[:count]) for count in (300, 40))
+    scales = (1.0, 1.0, 1.0), (0.01, 0.01, 0.01), (1.0, -1.0, 1.0), (3.0, 1.0, 0.2)
+    hair = [(strands, np.diag([*scale, 1.0])) for strands in (many, few) for scale in scales]
+    lights, places = sun(0.4, 0.7), ((0.0, 0.0, 0.0), (0.5, 0.2, 0.1), (3.0, -2.0, 5.0))
+    lights["count"] = 4
+    for light, place in zip(lights["light"][1:], places, strict=False):
+        light["kind"], light["casts_shadow"], light["position"][:3] = 1, True, place  # inside, near and far
+        light["axis"][:3] = 0.0, 0.0, -1.0
+    steps, calls, alone = drawing.Steps(strand_count=30), [], drawing.strand_records
+    monkeypatch.setattr(drawing, "strand_records", lambda *given: calls.append(given[0]) or alone(*given))
+    maps = shadows.ShadowMaps(64, 4)
+    maps.draw(lights, hair, [], steps, counted=20)
+    assert calls == [many, few]
+    maps.draw(lights, hair, [], steps, lambda index: (hair[:2] if index == 1 else hair, []), counted=20)
+    assert calls == [many, few] * 2 + [many]
+    views = [shadows._aim(light, hair, drawing.bounding_sphere(hair), 64) for light in lights["light"][:4]]
+    to_world = np.stack([place for _strands, place in hair[:4]])
+    together = shadows._records(many, np.stack(views), to_world, drawing.Steps(), is_steady=False)
+    assert len(np.unique(together["drawn_points"])) > 2
+    for records, view in zip(together, views, strict=True):
+        np.testing.assert_array_equal(records, shadows._records(many, view, to_world, drawing.Steps(), False))
