@@ -237,15 +237,16 @@ def before_frame_change(_scene, _depsgraph):
 @persistent
 def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces; regenerate animated hair, in renders too."""
-    reports = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change)
+    reports, edited = updates.read(depsgraph, bpy.app.handlers.frame_change_post, after_frame_change), set()
     if scene_time.is_shown(depsgraph):
         events.scene_changed(is_hair_only=updates.are_only_hair_in_frame(reports))
         for report in reports:
             if report.is_geometry and updates.type_of_object(report) == "CURVES":
                 events.hair_evaluated(report.datablock)
         deformed = updates.deformed(reports)
+        edited = _edited_by_script(reports, deformed)
         moving_surfaces.frame_changed(deformed & _surfaces())
-        frame_faces.note(deformed & _surfaces(), depsgraph)
+        frame_faces.note(deformed & _surfaces() - edited, depsgraph)
         for surface_object in deformed:
             events.surface_moved(surface_object)
     if not scene_time.may_write(scene, depsgraph):
@@ -253,16 +254,55 @@ def after_frame_change(scene, depsgraph):
         return
     is_render = scene_time.is_rendered(depsgraph)
     try:
-        moved = live_layers.follow_frame(depsgraph)
-        if animated.follow(depsgraph) or moved:
-            # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-            evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
+        # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
+        shown_in = bpy.context.evaluated_depsgraph_get() if is_render else depsgraph
+        combed = _follow_script(reports, edited, scene, shown_in)
+        moved = live_layers.follow_frame(depsgraph) | combed
+        has_other_ramps = stale_marks.follow_keyed_ramps(depsgraph)
+        is_outdated = (
+            not is_render and not scene_time.is_shown_moving() and any(map(_is_outdated, bpy.data.hair_curves))
+        )
+        if animated.follow(depsgraph) or has_other_ramps or moved or is_outdated:
+            evaluation.evaluate(shown_in, moved)
+            simulated_hair.note_combed(combed, scene)
             if is_render:
                 live_hair.write_all()
     finally:
         simulated_hair.follow_frame(scene, depsgraph)
         if is_render:
             live_hair.write_all()
+
+
+def _edited_by_script(reports, deformed):
+    """Return the surfaces whose meshes a script edited just before it changed the frame: no update reports them.
+
+    Windows update before they play. Meshes with animation are reported in each frame, also if nothing edited them.
+    """
+    if scene_time.is_shown_moving():
+        return set()
+    meshes = {mesh for mesh in updates.originals(reports, is_geometry=True) if isinstance(mesh, bpy.types.Mesh)}
+    return {one for one in deformed & _surfaces() if one.data in meshes and not _is_animated(one.data)}
+
+
+def _is_animated(mesh):
+    return any(one is not None and one.animation_data is not None for one in (mesh, mesh.shape_keys))
+
+
+def _follow_script(reports, edited, scene, depsgraph):
+    """Follow surfaces that a script edited, and guides that it moved, just before it changed the frame.
+
+    Returns {guide Curves that have moved: their (N, 3) points}.
+    """
+    if scene_time.is_shown_moving() and len(bpy.app.handlers.frame_change_pre) == 1:
+        return {}
+    if edited:
+        separated = _follow_surfaces(edited, {one.data for one in edited}, [], depsgraph)
+        stale_marks.follow_mapped_surfaces(edited)
+        live_layers.follow_masks({one for one in edited if one.mode == "OBJECT"}, depsgraph)
+        if separated:
+            copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
+    moved = [one for one in updates.originals(reports, is_geometry=True) if isinstance(one, bpy.types.Curves)]
+    return _follow_geometry([one for one in moved if one.vellus.kind == "GUIDES"], depsgraph)
 
 
 def _show_hidden():

@@ -11,8 +11,9 @@ from ..data.strands import curves, drawn_lines, gathered_groups
 from ..groom import bindings, frame_faces, staleness
 from ..groom.surfaces import applied_transforms, edited_surfaces, kept_densities
 from ..groom.surfaces.edited_surfaces import Followed
+from ..host import scene_time
 from ..host.notices import text_of
-from ..settings import marks, ramp_nodes, style_items
+from ..settings import animated, marks, ramp_nodes, style_items
 from . import events, last_update
 
 
@@ -296,16 +297,30 @@ def follow_ramps():
         for item in state.maps:
             for name in ("ramp", "course"):
                 if getattr(item, f"{name}_tree") is not None:
-                    _follow_ramp_of_map(hair, item, name, owners)
+                    _own_ramp(item, f"{name}_tree", owners)
+                    _follow_ramp_of_map(hair, item, name)
 
 
-def _follow_ramp_of_map(hair, item, name, owners):
-    _own_ramp(item, f"{name}_tree", owners)
+def follow_keyed_ramps(depsgraph):
+    """Mark hair and guides whose maps have keyed color ramps that changed in a frame; returns whether any did."""
+    is_render, is_changed = scene_time.is_rendered(depsgraph), False
+    for hair in bpy.data.hair_curves:
+        for item in animated.keyed_ramps(hair) if hair.is_editable else ():
+            if is_render:  # Blender animates the original ramps only for viewports
+                ramp_nodes.copy_colors(item.ramp_tree, item.ramp_tree.evaluated_get(depsgraph))
+            is_changed = _follow_ramp_of_map(hair, item, "ramp") or is_changed
+    return is_changed
+
+
+def _follow_ramp_of_map(hair, item, name):
+    """Mark hair whose map has another ramp than at the last update; returns whether it has."""
     key = ramp_nodes.text_of(getattr(item, f"{name}_tree"))
-    if key != getattr(item, f"{name}_key") and hair.is_editable:
+    is_changed = key != getattr(item, f"{name}_key") and hair.is_editable
+    if is_changed:
         setattr(item, f"{name}_key", key)
         if _has_effect(hair, item):
             marks.mark_changed_map(item)
+    return is_changed
 
 
 def _own_ramp(owner, name, owners):

@@ -37,6 +37,12 @@ def are_keyed(datablock):
     return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
 
 
+def keyed_ramps(curves):
+    """Return [map] of the maps of Curves whose color ramp may be animated or driven."""
+    maps = curves.vellus.maps
+    return [item for item in maps if item.ramp_tree is not None and are_keyed(item.ramp_tree)]
+
+
 def remember(is_made_with=False):
     """Store setting values before a frame change; is_made_with: whether strands match the present animated values."""
     for datablock in _keyed():

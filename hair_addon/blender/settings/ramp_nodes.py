@@ -77,6 +77,17 @@ def text_of(tree: bpy.types.NodeTree | None) -> str:
     return ramp_text.Curve(tuple(sorted(points)), node.mapping.extend.lower()).text()
 
 
+def copy_colors(tree: bpy.types.NodeTree, shown: bpy.types.NodeTree) -> None:
+    """Give a node group the color ramp of its evaluated copy `shown`, stop by stop: keys name stops by their index."""
+    to, source = node_of(tree), node_of(shown)
+    if to is None or source is None or not is_color(to):
+        return
+    for name in ("color_mode", "interpolation", "hue_interpolation"):
+        setattr(to.color_ramp, name, getattr(source.color_ramp, name))
+    for stop, of_frame in zip(to.color_ramp.elements, source.color_ramp.elements, strict=True):
+        stop.position, stop.color = of_frame.position, of_frame.color
+
+
 def _part(value):
     # Written so that NaN becomes 0.
     return shortest(min(value, 1.0)) if value > 0.0 else 0.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
+from hair_addon import api
 from hair_addon.blender.data.strands import attributes
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.render import hair_cache
@@ -19,7 +20,7 @@ from hair_addon.core.params import declared
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.tables import lookup_tables
-from tests.support.reading import attribute, points, write_points
+from tests.support.reading import attribute, points, vertex_positions, write_points
 
 
 def update():
@@ -135,6 +136,44 @@ def test_a_moved_surface_vertex_moves_the_roots(hair, sphere):
     sphere.data.update()
     update()
     np.testing.assert_allclose(np.linalg.norm(points(hair)[:, 0], axis=1), 2.0, atol=0.01)
+
+
+def test_edits_of_a_script_that_changes_the_frame_at_once_are_in_that_frame(hair, sphere):
+    """A change of the frame takes the reports of guides, vertices, weights and settings that a script edited before it:
+    the hair is as after an update.
+    """
+    guides, scene = bpy.data.objects["Guides"], bpy.context.scene
+    weights = sphere.vertex_groups.new(name="Length")
+    weights.add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
+    api.set_map(hair, "strands.strand_length", "group:Length")
+    update()
+
+    def comb():
+        combed = 0.5 * (points(guides) + points(guides)[:, :1])
+        guides.data.attributes["position"].data.foreach_set("vector", combed.ravel())
+        guides.data.update_tag()
+
+    def stretch():
+        sphere.data.vertices.foreach_set("co", (vertex_positions(sphere) * (1.0, 1.0, 1.5)).ravel().astype(np.float32))
+        sphere.data.update()
+
+    def paint():
+        weights.add(range(len(sphere.data.vertices)), 0.5, "REPLACE")
+        sphere.data.update()
+
+    def set_count():
+        hair.data.vellus.hair.strand_count = 200
+
+    for frame, edit in enumerate((comb, stretch, paint, set_count), scene.frame_current + 1):
+        before = points(hair)
+        edit()
+        scene.frame_set(frame)
+        after = points(hair)
+        assert not np.array_equal(after, before), edit.__name__
+        for edited in (sphere.data, guides.data, hair.data):
+            edited.update_tag()
+        update()
+        np.testing.assert_array_equal(points(hair), after, err_msg=edit.__name__)
 
 
 def test_nothing_is_made_again_while_live_is_off(hair):

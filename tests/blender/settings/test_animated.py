@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender.data.maps import strand_maps
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.live import handlers
 from hair_addon.blender.materials import looks, materials
+from hair_addon.blender.settings import ramp_nodes
 from hair_addon.core.shading import appearance
 from tests.support.guide_tools import grown_from_nothing, lengths_of
 from tests.support.pictures import render_probe
@@ -65,8 +67,13 @@ def test_a_frame_is_the_same_whichever_came_before(keyed_hair):
 
 def test_unanimated_hair_is_not_regenerated(keyed_hair, monkeypatch):
     made = []
+
+    def shade(shaded, *_args):
+        made.append("shading")
+        shaded.vellus.is_shading_stale = False
+
     monkeypatch.setattr(pipeline, "interpolate_hair", lambda *args: made.append("hair"))
-    monkeypatch.setattr(looks, "evaluate_shading", lambda *args: made.append("shading"))
+    monkeypatch.setattr(looks, "evaluate_shading", shade)
     scene = bpy.context.scene
     scene.frame_set(20)
     assert made == ["hair", "shading"]
@@ -207,3 +214,27 @@ def test_keyed_maps_vary_the_hair_of_each_frame_and_keep_their_keys(hair):
     parts = lengths_of(points(hair)) / long
     assert hair.data.vellus.maps[0].low == pytest.approx(0.2)
     assert parts.min() < 0.25 and parts.mean() == pytest.approx(0.6, abs=0.1)
+
+
+def test_keyed_color_ramps_color_the_hair_of_each_frame_and_render(hair):
+    """A stop of a map's color ramp is keyed from red to blue; a render leaves the viewport's frame as it was."""
+    hair.data.vellus.appearance.parametrization = "COLOR"
+    api.set_map(hair, "look.color", "strand", ramp="0:1/0/0")
+    node = ramp_nodes.node_of(hair.data.vellus.maps[0].ramp_tree)
+    for frame, color in ((1, (1.0, 0.0, 0.0, 1.0)), (11, (0.0, 0.0, 1.0, 1.0))):
+        node.color_ramp.elements[0].color = color
+        node.color_ramp.elements[0].keyframe_insert("color", frame=frame)
+
+    def shown(curves_data):
+        return strand_maps.read_looks(curves_data).root
+
+    def wanted(color):
+        look = appearance.Appearance(parametrization="COLOR", color=color)
+        return np.tile(np.float32(appearance.sigma_a(look)), (len(hair.data.curves), 1))
+
+    for frame, color in ((2, (0.972, 0.0, 0.028)), (6, (0.5, 0.0, 0.5))):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_allclose(shown(hair.data), wanted(color), rtol=1e-4)
+    with render_probe.reading(lambda depsgraph: shown(depsgraph.objects["Hair"].data)) as render:
+        np.testing.assert_allclose(render(frames=(11, 11, 1))[0], wanted((0.0, 0.0, 1.0)), rtol=1e-4)
+    np.testing.assert_allclose(shown(hair.data), wanted((0.5, 0.0, 0.5)), rtol=1e-4)

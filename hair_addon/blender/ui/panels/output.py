@@ -42,7 +42,8 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         column.operator("vellus.save_groom", icon="ASSET_MANAGER", text="Save Groom…")
         column.operator("vellus.apply_groom", icon="IMPORT", text="Apply Groom…")
         hair = hair_of(context.object)
-        if hair is not None and animated.are_keyed(hair) and not context.scene.render.use_lock_interface:
+        is_keyed = hair is not None and (animated.are_keyed(hair) or animated.keyed_ramps(hair))
+        if is_keyed and not context.scene.render.use_lock_interface:
             write(
                 layout,
                 context,
