@@ -254,16 +254,15 @@ def after_frame_change(scene, depsgraph):
         return
     is_render = scene_time.is_rendered(depsgraph)
     try:
-        # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-        shown_in = bpy.context.evaluated_depsgraph_get() if is_render else depsgraph
-        combed = _follow_script(reports, edited, scene, shown_in)
+        combed = _follow_script(reports, edited, scene, depsgraph)
         moved = live_layers.follow_frame(depsgraph) | combed
         has_other_ramps = stale_marks.follow_keyed_ramps(depsgraph)
         is_outdated = (
             not is_render and not scene_time.is_shown_moving() and any(map(_is_outdated, bpy.data.hair_curves))
         )
         if animated.follow(depsgraph) or has_other_ramps or moved or is_outdated:
-            evaluation.evaluate(shown_in, moved)
+            # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
+            evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
             simulated_hair.note_combed(combed, scene)
             if is_render:
                 live_hair.write_all()

@@ -175,6 +175,14 @@ def _is_of_another(blender_scene):
     return bool(_users_of(blender_scene.original))
 
 
+def filmed_scene(blender_scene):
+    """Return the scene with the samples and the shutter of a rendered scene: of a hair scene the scene that it belongs
+    to, whose keys apply in the frame.
+    """
+    is_its = _is_ours(blender_scene) and blender_scene.background_set is not None
+    return blender_scene.background_set if is_its else blender_scene
+
+
 def is_in_sequence(blender_scene):
     """Whether a scene is rendered as a hair scene in an animation, or without a window.
 

@@ -95,7 +95,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         self._require_renderable(blender_scene)
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)
-        offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
+        filmed = composite.filmed_scene(blender_scene)
+        offsets = _offsets(filmed.render, filmed.vellus.motion_steps)
         wanted = _passes(view_layer, blender_scene.render.use_motion_blur)
         passes = [name for name in wanted if not mattes.is_matte(name)]
         labels = mattes.Labels(view_layer.pass_cryptomatte_depth) if len(passes) < len(wanted) else None
@@ -146,8 +147,9 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     def _film_settings(self, depsgraph, size, passes, labels, step_count):
         """Return the arguments of a `Frame` after its window; motion steps share samples and paths."""
         blender_scene = depsgraph.scene
-        sample_count = depsgraph.view_layer.samples or blender_scene.vellus.sample_count
-        filter_width = pixel_sampling.FILTER_WINDOW * blender_scene.render.filter_size
+        filmed = composite.filmed_scene(blender_scene)
+        sample_count = depsgraph.view_layer.samples or filmed.vellus.sample_count
+        filter_width = pixel_sampling.FILTER_WINDOW * filmed.render.filter_size
         has_lens = cameras.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // step_count) if has_lens else 1
         path_count = -(-light_paths.path_count(blender_scene, size) // step_count)

@@ -211,9 +211,16 @@ def test_the_hair_s_scene_follows(cycles):
     assert late.visible_camera
 
 
-def test_each_frame_of_an_animation_has_its_hair(arm, tmp_path):
-    """Each frame of an animation has its hair on the deformed surface, and the camera of its marker."""
+def test_each_frame_of_an_animation_has_its_hair(arm, tmp_path, monkeypatch):
+    """Each frame of an animation has its hair on the deformed surface, the camera of its marker and its keyed shutter,
+    also in a window without Lock Interface, in which a render updates no viewport.
+    """
+    monkeypatch.setattr(scene_time, "may_write", lambda _scene, depsgraph: scene_time.is_shown(depsgraph))
     scene = bpy.context.scene
+    scene.render.use_motion_blur, scene.vellus.motion_steps = True, 2
+    for frame, shutter in ((1, 0.0), (11, 2.0)):
+        scene.render.motion_blur_shutter = shutter
+        scene.render.keyframe_insert("motion_blur_shutter", frame=frame)
     bpy.context.view_layer.objects.active = arm
     bpy.ops.vellus.add_hair(guide_count=60, strand_count=600, length=0.3, radius=0.01)
     for name, location in (("Camera", (0.0, 0.0, 9.0)), ("Cut", (0.0, 1.0, 12.0))):
