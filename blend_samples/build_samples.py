@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds each sample .blend from code: make samples."""
+"""Builds each sample .blend from code: make samples. ARGS=grooms builds the grooms that come with the add-on."""
 
 import sys
 from pathlib import Path
@@ -13,6 +13,7 @@ from blend_samples.comparisons import parting
 from blend_samples.dynamics import dynamics_film, dynamics_scene
 from blend_samples.heads import head, portrait
 from blend_samples.library import ten_grooms
+from hair_addon.blender.settings import asset_libraries
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -47,9 +48,9 @@ SAMPLES = {"head": build_head, "parting": build_parting, "dynamics": build_dynam
 def main():
     """Build the samples named on the command line, or all."""
     hair_addon.register()
-    for name in sys.argv[1:] or [*SAMPLES, "grooms"]:
+    for name in sys.argv[1:] or SAMPLES:
         if name == "grooms":  # an asset library, a file each
-            ten_grooms.build_library(FOLDER / "grooms")
+            ten_grooms.build_library(asset_libraries.SHIPPED)
             continue
         SAMPLES[name]()
         path = FOLDER / f"{name}.blend"

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 
+from hair_addon.blender.settings import asset_libraries
 from hair_addon.blender.ui import operators
 from tools import build_extension, compile_kernels, manual_pages
 
@@ -86,7 +87,9 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
         "__init__.py", "LICENSE", "blender_manifest.toml", "hair_addon", "kernels", "manual", "shaders", "wheels",
     }  # fmt: skip
     assert not [name for name in names if "__pycache__" in name or "/." in name]
-    assert [name for name in names if name.endswith(".blend")] == ["hair_addon/blender/data/strands/follow_nodes.blend"]
+    blends = {name for name in names if name.endswith(".blend")}
+    grooms = {f"hair_addon/grooms/{file.name}" for file in asset_libraries.SHIPPED.glob("*.blend")}
+    assert grooms and blends == {"hair_addon/blender/data/strands/follow_nodes.blend"} | grooms
     # Warp compiles kernels from their source, and the shaders are read as files.
     for folder in ("hair_addon", "shaders"):
         sources = [path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".pyc"]
@@ -117,7 +120,8 @@ def test_installs_and_enables(walk):
 
 def test_installed_operators_run(walk, used):
     made = used["operators"]
-    assert made["results"] == [["FINISHED"]] * 5
+    assert made["results"] == [["FINISHED"]] * 6
+    assert made["grooms"] == sorted(file.name for file in asset_libraries.SHIPPED.glob("*.blend"))
     assert made["curves"] == {"Guides": 30, "Hair": 300}
     assert made["finite"]
     names = ("m", "n", "n_trt", "n_res", "dual", "n_g", "n_g_trt")

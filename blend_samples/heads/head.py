@@ -37,8 +37,8 @@ CHESTNUT = (0.11, 0.27, 0.70)
 LOOK_AT = Vector((0.012, -0.04, 0.715))
 
 
-def build():
-    """Load the head into an empty scene, with its vertex group `scalp`; returns the object `Head`."""
+def load():
+    """Load the head into an empty scene without its subdivision; returns the object `Head`."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.obj_import(filepath=str(HEAD))
     head = bpy.context.object
@@ -49,6 +49,12 @@ def build():
     head.data.shade_smooth()
     head.data.materials.clear()
     head.data.materials.append(skin())
+    return head
+
+
+def build():
+    """Load the head into an empty scene, with its vertex group `scalp`; returns the object `Head`."""
+    head = load()
     _add_scalp(head)
     subdivision = head.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels = subdivision.render_levels = 1

@@ -20,15 +20,29 @@ def build():
     """Return the monkey in the place of the sample's head, with dark eyes; its object `Head` has the vertex group
     `fur`.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.mesh.primitive_monkey_add(size=2.0)
-    monkey = bpy.context.object
-    monkey.name = monkey.data.name = "Head"
+    monkey = _monkey()
     _give_materials(monkey)
     subdivision = monkey.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels = subdivision.render_levels = 2
     bpy.ops.object.modifier_apply(modifier=subdivision.name)
     _paint_fur(monkey)
+    return _in_place(monkey)
+
+
+def load():
+    """Return the same monkey without its subdivision, materials and vertex group."""
+    return _in_place(_monkey())
+
+
+def _monkey():
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add(size=2.0)
+    monkey = bpy.context.object
+    monkey.name = monkey.data.name = "Head"
+    return monkey
+
+
+def _in_place(monkey):
     monkey.data.transform(Matrix.Translation(head.LOOK_AT) @ Matrix.Scale(_SCALE, 4))
     monkey.data.shade_smooth()
     bpy.context.view_layer.update()

@@ -79,7 +79,7 @@ _OPERATORS = {
     ),
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
-    "groom_library": ("save_groom", "apply_groom"),
+    "groom_library": ("save_groom", "apply_groom", "add_grooms"),
     "use_as_guides": ("use_as_guides",),
     "use_as_hair": ("use_as_hair", "import_groom", "convert_particles"),
     "mesh_to_hair": ("mesh_to_hair",),

@@ -201,6 +201,7 @@ MAKING["hair_cards"].append((on_hair, MAKING["hair_cards"][0][1] | {"folder": "c
 # These change what is there, and settings; or show, choose and remove something. `deliver_dynamics` and baking write
 # files that are whole at any time, in `test_frame_cache` and `test_delivery`.
 OTHERS = {
+    "add_grooms",
     *("apply_dynamics_preset", "apply_preset", "apply_saved_look", "apply_saved_style", "apply_scale"),
     *("apply_style_preset", "attach_to_surface", "attract_guides", "bake_dynamics", "bake_tables"),
     *("add_layer", "apply_layers", "duplicate_layer", "merge_layer_down", "move_layer", "remove_layer"),

@@ -8,6 +8,9 @@ import bpy
 from ...core.errors import HairError
 from .translations import CONTEXT
 
+SHIPPED = Path(__file__).resolve().parents[2] / "grooms"  # folder of the grooms that come with the add-on
+_SHIPPED_NAME = "Vellus"
+
 # Blender's own numbers, used when it calls an operator for an asset.
 _KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4), ("CUSTOM", 100))
 
@@ -25,9 +28,38 @@ def _names(_owner, _context, typed):
 
 
 def first_name():
-    """Return the name of the first asset library, empty if there is none."""
+    """Return the name of the first asset library to save to, empty if there is none."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
-    return libraries[0].name if len(libraries) else ""
+    return next((library.name for library in libraries if not _is_shipped(library)), "")
+
+
+def _is_shipped(library):
+    return bool(library.path) and Path(bpy.path.abspath(library.path)) == SHIPPED
+
+
+def shipped_name():
+    """Return the name of the asset library of the grooms that come with the add-on, empty if it is not added."""
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    return next((library.name for library in libraries if _is_shipped(library)), "")
+
+
+def add_shipped():
+    """Add the folder of the grooms that come with the add-on to the asset libraries; returns the library's name.
+
+    The folder is not copied, so that updates of the add-on bring its present grooms.
+    """
+    if not shipped_name():
+        bpy.context.preferences.filepaths.asset_libraries.new(name=_SHIPPED_NAME, directory=str(SHIPPED))
+        bpy.context.preferences.is_dirty = True
+    return shipped_name()
+
+
+def folder_to_save(name):
+    """Return the folder of an asset library to save to, the first one for an empty name. Raises `HairError`."""
+    folder = folder_of(name or first_name())
+    if folder == SHIPPED:
+        raise HairError("Updates of Vellus replace the grooms that come with it: choose another asset library.")
+    return folder
 
 
 def folder_of(name):

@@ -21,7 +21,9 @@ METHODS = ("AUTO", "UV", "NEAREST")
 _SAME = 1e-3  # largest deviation of a copy from a similarity, relative to the surface's size
 _LEAST_KEPT = 0.9  # least fraction of guides that UV maps of the same layout place
 _MOST_STRETCH = 0.25  # largest RMS deviation from a similarity for UV maps that agree, relative to the roots' spread
-_REACH = 0.05  # largest distance of a root or a mask from the surface, relative to the surface's size
+# Largest distance of a root or a mask from the surface, relative to the surface's size. Bounding boxes of heads with
+# large ears or long necks align scalps poorly: guides that lie a little aside are better than bald places.
+_REACH = 0.2
 _OUTSIDE = 1e-3  # largest distance of a mask from a UV layout, relative to the layout's size
 
 

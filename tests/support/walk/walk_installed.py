@@ -72,6 +72,7 @@ def _operators(folder):
         bpy.ops.vellus.bake_tables(directory=str(folder)),
         _apply_preset(bpy.data.objects["Hair"]),
         bpy.ops.vellus.render_picture(filepath=str(folder / "picture.png"), width=160, height=120),
+        bpy.ops.vellus.add_grooms(),
     ]
     picture = bpy.data.images.load(str(folder / "picture.png"))
     pixels = np.array(picture.pixels[:]).reshape(-1, 4)
@@ -84,6 +85,7 @@ def _operators(folder):
         "finite": all(np.isfinite(_positions(curves)).all() for curves in bpy.data.hair_curves),
         "tables": sorted(path.name for path in folder.glob("*.exr")),
         "cached": [path.name for path in _user_folder().glob("tables/*/n.exr")],
+        "grooms": sorted(path.name for path in _library_folder().glob("*.blend")),
         "picture": [*picture.size, float(pixels[:, :3].std())],
         "wheels": [warp.__file__, OpenEXR.__file__],
     }
@@ -91,6 +93,10 @@ def _operators(folder):
 
 def _user_folder():
     return Path(bpy.utils.extension_path_user(MODULE))
+
+
+def _library_folder():
+    return Path(bpy.context.preferences.filepaths.asset_libraries["Vellus"].path)
 
 
 def _apply_preset(hair):

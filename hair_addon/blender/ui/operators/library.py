@@ -14,7 +14,7 @@ from ...host.notices import name_of
 from ...settings import asset_libraries, properties
 from ...settings.translations import report_text
 from .base.file_browser import BrowsedOperator
-from .base.hair_operator import needs_hair
+from .base.hair_operator import HairOperator, needs_hair
 from .base.modal import LongOperator
 
 
@@ -44,7 +44,7 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
 
     def work(self, context):
         hair = hair_of(context.object)
-        folder = asset_libraries.folder_of(self.library or asset_libraries.first_name())
+        folder = asset_libraries.folder_to_save(self.library)
         path = io.groom_library.path_of(folder, self.name or name_of(hair))
         if path.exists() and not self.overwrites:
             raise HairError("{path} exists: choose another name, or turn on Overwrite.", path=path)
@@ -117,7 +117,23 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
             self.report({"WARNING"}, report_text(sentence, **values))
 
 
+class VELLUS_OT_add_grooms(HairOperator, bpy.types.Operator):
+    """Add the grooms that come with Vellus to the asset libraries of the preferences, and show the asset shelf"""
+
+    bl_idname = "vellus.add_grooms"
+    bl_label = "Add Vellus Grooms"
+    bl_options = {"REGISTER"}
+
+    def change(self, context):
+        name = asset_libraries.add_shipped()
+        asset_libraries.show_changes(name)
+        if context.area is not None and context.area.type == "VIEW_3D":
+            context.area.spaces.active.show_region_asset_shelf = True
+        return "The asset library {name} has the grooms that come with Vellus", {"name": name}
+
+
 CLASSES = (
     VELLUS_OT_save_groom,
     VELLUS_OT_apply_groom,
+    VELLUS_OT_add_grooms,
 )

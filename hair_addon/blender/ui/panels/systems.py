@@ -6,6 +6,7 @@ import bpy
 from ...groom.selection import object_of, surface_of
 from ...groom.systems.diagnostics import color_note
 from ...groom.systems.hair_systems import edited_system, guides_of_system, systems_of
+from ...settings import asset_libraries
 from .. import setting_rows
 from ..operators.systems import is_combing
 from .tab import HairTab, draw_combing, write
@@ -53,6 +54,8 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
                 setting_rows.search_row(layout, surface.vellus_new_hair, "mask", surface, "vertex_groups")
             layout.operator("vellus.add_hair", icon="ADD")
             layout.operator("vellus.apply_groom", icon="ASSET_MANAGER", text="Apply Groom…")
+            if not asset_libraries.shipped_name():
+                layout.operator("vellus.add_grooms", icon="ADD")
             return
         row = layout.row()
         row.template_list(
