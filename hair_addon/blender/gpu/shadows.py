@@ -3,6 +3,7 @@
 
 import weakref
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 
 import gpu
@@ -89,11 +90,22 @@ class ShadowMaps:
         lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
             return
+        draw = partial(self._draw, lights, hair, surfaces, steps, casters, is_steady, chosen, counted)
+        is_kept, before = is_steady and self._sphere is not None, self._sphere
+        is_drawn = is_kept and any(strands.are_bounds_pending for strands, _to_world in hair)
+        if is_drawn:
+            draw()  # before the bounds are read, which waits until the GPU has made the strands: most of them fit
         loose = drawing.bounding_sphere(hair)
-        self._sphere = loose = _steady(loose, self._sphere) if is_steady and self._sphere else loose
+        self._sphere = _steady(loose, before) if is_kept else loose
+        if not (is_drawn and self._sphere is before):
+            draw()
+
+    def _draw(self, lights, hair, surfaces, steps, casters, is_steady, chosen, counted):
+        """`draw` with the maps aimed at the present sphere."""
         views = {}
         for index in range(min(int(lights["count"]), self.layer_count)) if chosen is None else (chosen,):
-            view = self._aimed(index, lights["light"][index], hair, loose)
+            view = self._aimed(index, lights["light"][index], hair, self._sphere)
+            lights["light"][index]["shadow_layer"] = -1
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index

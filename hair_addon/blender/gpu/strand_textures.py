@@ -84,6 +84,11 @@ class StrandsOnGPU:
         """(2, 3): least and greatest coordinates; waits until the GPU has made the strands."""
         return self.read_bounds()
 
+    @property
+    def are_bounds_pending(self) -> bool:
+        """Whether reading `bounds` may wait for the GPU."""
+        return self.is_made and "bounds" not in self.__dict__
+
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
         """A center (3,), and the greatest distance of all points from it.

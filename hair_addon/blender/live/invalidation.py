@@ -28,7 +28,7 @@ from ..gpu import (
     surface_textures,
     world_texture,
 )
-from ..gpu.programs import shaders
+from ..gpu.programs import shaders, uniforms
 from ..groom import bindings, followed_names, frame_faces, hidden_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..groom.guides import guide_states, outside_guides
@@ -129,6 +129,7 @@ OTHERS = (
     followed_names.object_cache,
     guide_simulation.stiffness_cache,
     shaders.error_cache,
+    uniforms.buffer_cache,
     surface_shading.texture_cache,
     surface_shading.baked_cache,
     surface_textures.surface_cache,

@@ -180,19 +180,18 @@ def read(
     drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, is_wire=shown.is_wire, **surroundings)
     if shown.light.kind != viewport_shading.SCENE:
         drawn = replace(drawn, is_shadowed=tuple(owner[0] in grown_on for owner in drawn.surface_owners))
-    (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
     drawn = replace(
         drawn,
-        hair_visibility=hair_seen,
-        surface_visibility=surfaces_seen,
         owners=tuple(place.owner for place in places),
         hair_owners=hair_owners,
         selected=tuple(place.is_selected for place in places),
         instances=instances,
-        renewal=renewal,
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
-    return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+    # Lights first: while the GPU makes strands, only their maps can be drawn without the bounds of these strands.
+    drawn = _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+    (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
+    return replace(drawn, hair_visibility=hair_seen, surface_visibility=surfaces_seen, renewal=renewal)
 
 
 def _surface_uids(places):

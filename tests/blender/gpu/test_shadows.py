@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shadows of hair and of surfaces: soft by the light's size, and without flicker while a light rotates."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -360,3 +363,36 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
     assert len(np.unique(together["drawn_points"])) > 2
     for records, view in zip(together, views, strict=True):
         np.testing.assert_array_equal(records, shadows._records(many, view, to_world, drawing.Steps(), False))
+
+
+def test_maps_of_strands_that_the_gpu_makes_do_not_wait_for_their_bounds(scene, rng, monkeypatch):
+    """Maps are drawn before the bounds are read, and are the same as with known bounds, also if strands outgrow
+    them.
+    """
+    points, radii = tuft(rng, 300)
+    waits, knows = (shadows.ShadowMaps(64, 2, in_compute=True) for _ in range(2))
+    events, real = [], drawing.rasterize_strands
+    monkeypatch.setattr(drawing, "rasterize_strands", lambda *given: events.append("drawn") or real(*given))
+
+    def read(bounds):
+        events.append("read")
+        return bounds
+
+    counts = []
+    for size, mirrored in ((1.0, 1), (1.2, 1), (1.21, -1), (1.9, 1), (1.95, 1), (0.4, 1)):
+        to_world = np.diag([0.01, 0.02 * mirrored, 0.01, 1.0])
+        known = strand_textures.upload_strands(points * np.float32(size), radii)
+        made = replace(known, is_made=True, read_bounds=partial(read, known.bounds))
+        records = []
+        for maps, strands in ((knows, known), (waits, made)):
+            events.clear()
+            lights = sun(0.3, 0.8)
+            lights["count"], lights["light"][1] = 2, sun(2.0, 0.5)["light"][0]
+            maps.draw(lights, [(strands, to_world)], [], is_steady=True)
+            records.append(lights)
+        assert records[0].tobytes() == records[1].tobytes()
+        for texture, other in zip(waits.samplers.values(), knows.samplers.values(), strict=True):
+            np.testing.assert_array_equal(np.array(texture.read()), np.array(other.read()))
+        counts.append((events.index("read"), len(events) - 1))
+    # Each map draws the strands twice. The aim changes with the second, fourth and last hair.
+    assert counts == [(0, 4), (4, 8), (4, 4), (4, 8), (4, 4), (4, 8)]

@@ -109,3 +109,17 @@ def test_shaders_read_settings_as_they_were_made(settings):
             once=np.zeros(1),
         )
         np.testing.assert_allclose(found[0], value, rtol=1e-6)
+
+
+def test_records_with_the_same_bytes_share_a_buffer(scene):
+    """A frame allocates no buffer for records of the last frame; changed records and buffers to update have their
+    own.
+    """
+    record = uniforms.VIEW.record()
+    known = uniforms.uniform_buffer(record)
+    assert uniforms.uniform_buffer(record.copy()) is known
+    assert uniforms.own_uniform_buffer(record) is not known
+    record["thickness"] = 2.0
+    assert uniforms.uniform_buffer(record) is not known
+    record["thickness"] = 0.0
+    assert uniforms.uniform_buffer(record) is known

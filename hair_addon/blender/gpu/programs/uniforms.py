@@ -11,6 +11,7 @@ import gpu
 import numpy as np
 
 from ....core.params import declared
+from ...host.caches import Cache
 
 # GLSL type → (NumPy scalar, shape, alignment in bytes). A mat4 is column-major: it is filled with a transpose.
 _TYPES = {
@@ -305,8 +306,18 @@ def fill(settings):
     return record
 
 
+# Bytes of a record → its buffer. Most records of a frame are those of the last frame, and graphics drivers take longer
+# to allocate and fill a buffer than to draw with it.
+buffer_cache = Cache(capacity=512)
+
+
 def uniform_buffer(record):
-    """Return a GPUUniformBuf with the bytes of a record."""
+    """Return a GPUUniformBuf with the bytes of a record, which is shared and must not be updated."""
+    return buffer_cache.get(record.tobytes(), lambda: own_uniform_buffer(record))
+
+
+def own_uniform_buffer(record):
+    """Return a new GPUUniformBuf with the bytes of a record, which may be updated."""
     return gpu.types.GPUUniformBuf(bytes_of(record))
 
 

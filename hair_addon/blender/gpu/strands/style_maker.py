@@ -310,7 +310,7 @@ def _new_pass(record, data, program, axes, point_count):
     record["strand_count"], record["point_count"] = len(data.normals), point_count
     record["row_strands"] = TEXTURE_WIDTH // point_count
     _put_steps(record, program)
-    return _Pass(known, record, uniforms.uniform_buffer(record))
+    return _Pass(known, record, uniforms.own_uniform_buffer(record))
 
 
 def _put_steps(record, program):
