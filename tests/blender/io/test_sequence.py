@@ -243,6 +243,7 @@ def test_a_failing_worker_reports_its_error_once(turning, tmp_path, monkeypatch)
     assert not list(tmp_path.glob("f_*.png")) and hidden(tmp_path) == [".f_##.png.json"]
 
 
+@pytest.mark.farm
 def test_it_waits_for_frames_of_other_processes(tmp_path):
     """A frame that another process has claimed is rendered here if that process ends without it."""
     pattern = tmp_path / "f_#.png"

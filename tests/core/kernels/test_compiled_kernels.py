@@ -121,6 +121,7 @@ def folders(made, tmp_path_factory):
     return found
 
 
+@pytest.mark.farm
 def test_the_same_hair_and_nothing_is_compiled(folders, tmp_path):
     """Each processor level that this machine supports gives the same hair and compiles nothing."""
     cache = tmp_path / "cache"
@@ -132,6 +133,7 @@ def test_the_same_hair_and_nothing_is_compiled(folders, tmp_path):
     assert list(cache.rglob("*.o")) == []
 
 
+@pytest.mark.farm
 def test_strands_are_the_same_bits_on_every_processor(folders):
     """Kernels of each level give the same bits, also if NumPy, OpenBLAS and the C library run on old processors."""
     best, *others = made_by(*folders)
