@@ -3,7 +3,7 @@
 
 import ast
 
-from tests.test_conventions import MODULES, name_of, nodes, syntax
+from tests.test_conventions import MODULES, name_of, no_garbage_collection, nodes, syntax  # noqa: F401 (a fixture)
 
 # State that is no cache → the event that resets it.
 STATE = {

@@ -9,6 +9,7 @@ from pathlib import Path
 import bpy
 
 from hair_addon import blender
+from tests.support.syntax import nodes_of
 
 ADDON = Path(blender.__file__).resolve().parents[1]
 
@@ -80,7 +81,7 @@ def _read():
     found = {}
     for path in ADDON.rglob("*.py"):
         read = found[path] = _Read([], [])
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes_of(ast.parse(path.read_text(encoding="utf-8"))):
             read.shown.extend((text, node.lineno) for text in _shown(node))
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "HairError" and node.args:
                 read.errors.extend(_literals(ast.walk(node.args[0])))
