@@ -46,7 +46,7 @@ class KernelOnGPU:
 
     @cached_property
     def _buffer(self):
-        return uniforms.uniform_buffer(self.record)
+        return uniforms.own_uniform_buffer(self.record)  # `run` updates it
 
     def run(self, count: int, first: int = 0) -> dict[str, np.ndarray]:
         """Run `count` threads and return the arrays that they write: {name: (count,) or (count, 3)}, zero where nothing

@@ -8,6 +8,7 @@ import pytest
 import warp as wp
 
 from hair_addon.blender.gpu import kernel_programs
+from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.imaging import lamps
 from hair_addon.core.shading.light_paths import gather, media, seen_rays, start_places, view, voxel_sums
 from tests.core.shading.light_paths.test_gather import (
@@ -117,7 +118,9 @@ def test_a_kernel_writes_what_warp_writes(rng):
     parameters = {"given": given, "seeds": seeds, "first": 0}
     written = {"out_random": float, "out_vector": wp.vec3, "out_whole": int, "out_bits": wp.uint32}
     expected = run_in_warp(_everything, COUNT, parameters, written)
-    found = kernel_programs.prepare(_everything, parameters).run(COUNT)
+    prepared = kernel_programs.prepare(_everything, parameters)
+    assert prepared._buffer is not uniforms.uniform_buffer(prepared.record)  # `run` would change a shared buffer
+    found = prepared.run(COUNT)
     for name in ("out_random", "out_whole", "out_bits"):
         np.testing.assert_array_equal(found[name], expected[name], name)
     np.testing.assert_allclose(found["out_vector"], expected["out_vector"], rtol=2e-5, atol=2e-5)
