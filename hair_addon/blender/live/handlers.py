@@ -290,7 +290,7 @@ def _is_animated(mesh):
 def _follow_script(reports, edited, scene, depsgraph):
     """Follow surfaces that a script edited, and guides that it moved, just before it changed the frame.
 
-    Returns {guide Curves that have moved: their (N, 3) points}.
+    Returns {guide Curves that have moved: None}, whose points are read later, as settings of the frame may change them.
     """
     if scene_time.is_shown_moving() and len(bpy.app.handlers.frame_change_pre) == 1:
         return {}
@@ -301,7 +301,7 @@ def _follow_script(reports, edited, scene, depsgraph):
         if separated:
             copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
     moved = [one for one in updates.originals(reports, is_geometry=True) if isinstance(one, bpy.types.Curves)]
-    return _follow_geometry([one for one in moved if one.vellus.kind == "GUIDES"], depsgraph)
+    return dict.fromkeys(_follow_geometry([one for one in moved if one.vellus.kind == "GUIDES"], depsgraph))
 
 
 def _show_hidden():

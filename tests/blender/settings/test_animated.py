@@ -175,6 +175,20 @@ def test_what_a_script_keys_and_drives_is_in_its_first_render(hair, rendered):
     assert radii[0] == pytest.approx(0.02)
 
 
+def test_each_frame_of_a_render_has_the_hair_of_its_keyed_guides(hair):
+    guides = bpy.data.objects["Guides"].data
+    for frame, length in ((1, 0.2), (11, 0.4)):
+        guides.vellus.guides.length = length
+        guides.keyframe_insert("vellus.guides.length", frame=frame)
+    frames, shape = (6, 12, 3), points(hair).shape
+    with render_probe.reading(lambda depsgraph: curves.read_points(depsgraph.objects["Hair"].data)) as render:
+        found = [lengths_of(strands.reshape(shape)).mean() for strands in render(frames=frames)]
+    for length, frame in zip(found, range(frames[0], frames[1] + 1, frames[2]), strict=True):
+        bpy.context.scene.frame_set(frame)
+        assert length == pytest.approx(lengths_of(points(hair)).mean(), rel=1e-4)
+    assert found == sorted(found) and found[-1] > 1.2 * found[0]
+
+
 def test_a_driver_that_a_file_has_computes_nothing_again_when_it_is_opened(hair, tmp_path, monkeypatch):
     drive(hair, "vellus.hair.radius")
     bpy.context.view_layer.update()
