@@ -18,7 +18,11 @@ float depth_at(ivec2 pixel)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
-  vec4 light = max(texelFetch(passes, pixel, 0), vec4(0.0));
+  vec4 light = texelFetch(passes, pixel, 0);
+  if (first_part > 0.0) {
+    light = mix(light, float(pass_count) * texelFetch(first_picture, pixel, 0), first_part);
+  }
+  light = max(light, vec4(0.0));
   if (light.a == 0.0) {
     discard;
   }

@@ -7,6 +7,7 @@
 #include "visibility/segment.glsl"
 #include "visibility/tile.glsl"
 #include "visibility/unclipped.glsl"
+#include "visibility/uncounted.glsl"
 
 // Compile-time constants of a program, as software drivers execute all branches:
 //
@@ -34,6 +35,8 @@ const float LEAST_BEND = 1.0;
 // void meet(ivec2 place, float along, float across, float coverage)
 //     called for a covered sample: its parameter along the segment, outside of [0, 1] in a round end; its offset from the
 //     axis as a fraction of the drawn half width, and the strand's coverage of the drawn width
+//
+// visibility/uncounted.glsl has two more, for parts of samples.
 
 // The first sample, counted from -1, whose center is beyond a position.
 int first_sample(float place)
@@ -100,6 +103,7 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
       float half_width = max(true_half_width, least_half_width);
       float middle = start.y + beyond * slope;
       float reach = half_width * widening;
+      count_part(is_steep, column, last_place.y, vec2(middle - reach, middle + reach), along);
       float offset_part = HAS_TILES ? view.sample_offset * offset_share(true_half_width) : 0.0;
       if (HAS_TILES && offset_part > 0.0) {
         middle -= offset_part * sample_offset(first_place.x + column, float(first_place.y) + middle, turn);
@@ -138,6 +142,7 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
       bool is_ahead = (is_steep ? way.y : way.x) * right < 0.0;
       if (is_beyond && is_ahead && dot(way, way) < half_width * half_width) {
         meet(ivec2(column, row), 1.0, length(way) / half_width, 1.0);
+        count_all(ivec2(column, row));
       }
     }
   }
@@ -153,6 +158,7 @@ void fill_end(vec2 end, float half_width, float along, ivec2 size)
       float away = distance(vec2(column, row) + 0.5, end) / half_width;
       if (away < 1.0) {
         meet(ivec2(column, row), along, away, 1.0);
+        count_all(ivec2(column, row));
       }
     }
   }

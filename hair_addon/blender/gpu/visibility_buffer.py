@@ -136,6 +136,9 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
         self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # farthest depth in each tile
+        self._parts_of_samples = None
+        # Parts of samples that the last hair covers: bits of visibility/covered_parts.glsl, if they are counted.
+        self.covered = None
         self._seen_runs = None  # a texel for each run of segments
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
@@ -212,9 +215,9 @@ class VisibilityBuffer:
                 with windows.drawn_in(placed.window):
                     drawing.cover(program)
 
-    def add_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
+    def add_hair(self, hair, lights, view, in_compute=None, clip_planes=None, is_counted=False):
         """Find the hair in front of surfaces and shade it; arguments as for `find_hair`."""
-        self.find_hair(hair, lights, view, in_compute, clip_planes)
+        self.find_hair(hair, lights, view, in_compute, clip_planes, is_counted)
         self.shade_hair()
 
     def shade_hair(self):
@@ -222,19 +225,19 @@ class VisibilityBuffer:
         for placed in self._hair:
             self._shade(placed, self.color)
 
-    def find_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
+    def find_hair(self, hair, lights, view, in_compute=None, clip_planes=None, is_counted=False):
         """Fill `segments` and `depths` with the nearest hair in front of surfaces. Raises `HairError`.
 
         hair: [`strand_batches.Batch`], or [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene,
         Steps)] of single objects; lights, view: records of `uniforms`, lights one for all hair or (H,) for each;
         in_compute: find the nearest strands by a compute program, None: if supported; clip_planes: (6, 4) of
-        `uniforms.CLIPPING`, None for none.
+        `uniforms.CLIPPING`, None for none; is_counted: also fill `covered`, if a compute program draws all strands.
         """
-        self._clip_planes = clip_planes
+        self._clip_planes, self.covered = clip_planes, None
         self._hair = self._placed(hair, lights, view)
         is_refused = int(self._counts.sum()) > NO_SEGMENT
         if not is_refused and (scene_programs.has_image_atomics() if in_compute is None else in_compute):
-            self._find()
+            self._find(is_counted)
             return
         self._clear()
         if is_refused:
@@ -385,7 +388,7 @@ class VisibilityBuffer:
         nearest = np.unravel_index(np.argmin(away), away.shape)
         return int(found[nearest]) if np.isfinite(away[nearest]) else None
 
-    def _find(self):
+    def _find(self, is_counted):
         """Find the nearest segments by compute programs: first depths, then indices."""
         self._copy_depths(is_start=True)
         self._provide_runs(sum(placed.run_count for placed in self._hair))
@@ -399,6 +402,8 @@ class VisibilityBuffer:
         count = sum(placed.segment_count for placed in self._hair)
         length = sum(placed.total_length for placed in self._hair)
         if count < _FEW_SEGMENTS or length < _SHORT_SEGMENTS * count:
+            if is_counted:
+                self._clear_parts()
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
@@ -408,6 +413,12 @@ class VisibilityBuffer:
         self._walk(all_blocks, drawing.WALK_OTHERS, is_depth=True, are_tiles_known=True)
         self._find_farthest()
         self._walk(all_blocks, drawing.WALK_ALL, is_depth=False, are_tiles_known=True)
+
+    def _clear_parts(self):
+        if self._parts_of_samples is None:
+            self._parts_of_samples = gpu.types.GPUTexture(self.size, format="R32UI")
+        self.covered = self._parts_of_samples
+        self.covered.clear(format="UINT", value=(0,))
 
     def _provide_runs(self, count):
         """Provide a texture of at least `count` runs."""
@@ -424,11 +435,14 @@ class VisibilityBuffer:
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
-        shared = {"farthest_depths": self._farthest}, images, {"are_tiles_known": int(are_tiles_known)}, part
-        drawn = zip(self._hair, all_blocks, strict=True)
+        samplers, is_counted = {"farthest_depths": self._farthest}, is_depth and self.covered is not None
+        if is_counted:
+            images, samplers = images | {"covered": self.covered}, samplers | {"surface_depth": self.surface_depth}
+        shared = samplers, images, {"are_tiles_known": int(are_tiles_known)}, part
+        drawn, is_clipped = zip(self._hair, all_blocks, strict=True), self._clip_planes is not None
         for kind, some in groupby(drawn, key=lambda one: (one[0].is_round, one[0].objects is not None)):
             is_round, is_batch = kind
-            program = scene_programs.segments_program(is_depth, is_round, self._clip_planes is not None, is_batch)
+            program = scene_programs.segments_program(is_depth, is_round, is_clipped, is_batch, is_counted)
             with drawing.rasterizing(program, {}, *shared):
                 for placed, blocks in some:
                     strands, first_run = placed.batch.strands, {"first_run": placed.first_run}

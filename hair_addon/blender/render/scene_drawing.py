@@ -49,14 +49,14 @@ def _number_surfaces(drawn, view):
             first_triangle += surface.triangle_count
 
 
-def draw_hair(drawn, view, buffer, is_viewport=False, clip_planes=None):
+def draw_hair(drawn, view, buffer, is_viewport=False, clip_planes=None, is_counted=False):
     """Draw all hair in front of the surfaces of a `VisibilityBuffer`.
 
     view: a `uniforms.VIEW` record; is_viewport: use the viewport's level of detail and fraction of strands;
-    clip_planes: as for `draw_hiding`.
+    clip_planes: as for `draw_hiding`; is_counted: as for `VisibilityBuffer.find_hair`.
     """
     hair = _hair_in_view(drawn, view, is_viewport)
-    buffer.add_hair(hair, _hair_lights(drawn), view, clip_planes=clip_planes)
+    buffer.add_hair(hair, _hair_lights(drawn), view, clip_planes=clip_planes, is_counted=is_counted)
 
 
 def relight_viewport(drawn, view, buffer, is_shadowed=False):

@@ -23,11 +23,10 @@ def shading():
     return hair_shading.kajiya_kay_shading(kajiya_kay.Settings())
 
 
-def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, clip_planes=None):
-    """Return (segment, depth), each (height, width), of [(points, radii, object to world)] seen along -Z from the
-    origin.
+def filled(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, clip_planes=None, is_counted=False):
+    """Return the buffer of [(points, radii, object to world)] seen along -Z from the origin.
 
-    A segment is negative where there is none. hiding_at: distance of a surface that fills the left half of the view.
+    hiding_at: distance of a surface that fills the left half of the view.
     """
     buffer = visibility_buffer.VisibilityBuffer(*SIZE)
     view = drawing.pass_record(np.eye(4), view_to_clip, SIZE)
@@ -45,7 +44,13 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, 
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
     ]
-    buffer.add_hair(hair, lights, view, in_compute, clip_planes)
+    buffer.add_hair(hair, lights, view, in_compute, clip_planes, is_counted)
+    return buffer
+
+
+def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, clip_planes=None):
+    """Return (segment, depth), each (height, width), of `filled`; a segment is negative where there is none."""
+    buffer = filled(placed, view_to_clip, shading, in_compute, hiding_at, steps, clip_planes)
     counts = [len(points) * ((steps.point_count or points.shape[1]) - 1) for points, _radii, _place in placed]
     segments = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1])
     depths = np.array(buffer.depths.read()).astype(np.uint32).reshape(SIZE[::-1]).view(np.float32)
@@ -141,6 +146,31 @@ def test_triangles_and_the_computed_show_the_same_strands(rng, shading, view_to_
     # Strands of both are there, and what is behind the surface is in neither.
     count = placed[0][0].shape[0] * ((steps.point_count or 33) - 1)
     assert (computed[both] >= count).any() and (computed[both] < count).any()
+
+
+def test_counted_parts_of_samples_are_those_that_strands_cover(rng, shading):
+    """Lines through samples find the area that crossing strands of all widths cover, only in front of a surface."""
+    angles, offsets = rng.uniform(0.0, np.pi, 24), rng.uniform(-0.15, 0.15, 24)
+    along = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    points = np.full((24, 2, 3), -2.0, np.float32)
+    points[..., :2] = (offsets[:, None] * along[:, ::-1] * [-1.0, 1.0])[:, None] + along[:, None] * [[[-1.0], [1.0]]]
+    sample = 0.4 / SIZE[1]
+    radii = np.repeat(rng.uniform(0.1, 1.5, (24, 1)) * sample, 2, axis=1).astype(np.float32)
+    side = 8
+    y, x = (np.indices((SIZE[1] * side, SIZE[0] * side)) + 0.5) * sample / side - np.array([[[0.2]], [[HALF_WIDTH]]])
+    distances = np.abs(along[:, 0, None, None] * y - along[:, 1, None, None] * x - offsets[:, None, None])
+    wanted = (distances < radii[:, :1, None]).any(axis=0).reshape(SIZE[1], side, SIZE[0], side).mean(axis=(1, 3))
+    for hiding_at in (None, 1.0):
+        given = [(points, radii, np.eye(4))], PARALLEL, shading, True, hiding_at
+        bits = np.array(filled(*given, is_counted=True).covered.read(), np.uint32).reshape(SIZE[::-1])
+        lines = np.stack([np.bitwise_count(bits & 0xFFFF), np.bitwise_count(bits >> 16)]) / 16.0
+        found = 1.0 - (1.0 - lines[0]) * (1.0 - lines[1])
+        left = slice(0, SIZE[0] // 2 if hiding_at else 0)
+        assert not found[:, left].any()
+        right = slice(left.stop, None)
+        assert found[:, right].mean() == pytest.approx(wanted[:, right].mean(), rel=0.01)
+        assert np.sqrt(((found - wanted)[:, right] ** 2).mean()) < 0.05
+        assert filled(*given).covered is None
 
 
 def test_a_strand_behind_a_surface_is_hidden(shading):

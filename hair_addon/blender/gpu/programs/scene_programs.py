@@ -117,14 +117,19 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_
 
 
 @cached
-def segments_program(is_depth, is_round, is_clipped=False, is_batch=False):
+def segments_program(is_depth, is_round, is_clipped=False, is_batch=False, is_counted=False):
     """Return the compute program that draws strands as samples of a picture: see visibility/strand_segments.comp.
 
-    is_batch: of linked hair objects.
+    is_batch: of linked hair objects; is_counted: also find the parts of samples that strands cover, see
+    visibility/covered_parts.glsl.
     """
     images, constants = ("depths", "segments", "seen_runs"), ("are_tiles_known",)
     defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
-    options = {"samplers": samplers, "is_clipped": is_clipped, "is_batch": is_batch}
+    counting = {}
+    if is_counted:
+        images, samplers = (*images, "covered"), (*samplers, ("surface_depth", "FLOAT_2D"))
+        counting["visibility/uncounted.glsl"] = "visibility/covered_parts.glsl"
+    options = {"samplers": samplers, "is_clipped": is_clipped, "is_batch": is_batch, "counting": counting}
     if not is_batch:
         constants = ("first_run", *constants)
     return _walk("visibility/strand_segments.comp", images, defined, constants, **options)
@@ -142,11 +147,21 @@ def strand_shadow_program(is_front, is_batch=False):
     return _walk("shadows/strand_shadow.comp", images, defined, **options)
 
 
-def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False, is_batch=False):
+def _walk(
+    file,
+    images,
+    defined,
+    constants=(),
+    shadow_samplers=(),
+    samplers=(),
+    is_clipped=False,
+    is_batch=False,
+    counting=None,
+):
     info = gpu.types.GPUShaderCreateInfo()
     for name, value in defined.items():
         info.define(name, str(value).lower())
-    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch)
+    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch) | (counting or {})
     if is_batch:
         samplers, constants = (*samplers, _BATCH_SAMPLER), (*constants, "object_count")
     info.local_group_size(RUN_GROUP_SIZE)
@@ -281,6 +296,18 @@ def accumulate_program():
 
 
 @cached
+def first_picture_program():
+    """Return the compute program of the first picture from one sample per pixel: see picture/first_picture.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [pixels]
+    info.sampler(0, "FLOAT_2D", "picture")
+    info.sampler(1, "UINT_2D", "covered")
+    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "first_picture", qualifiers={"WRITE"})
+    return compile_compute(info, "picture/first_picture.comp")
+
+
+@cached
 def display_program():
     """Return the program that shows hair over a viewport: see picture/display.frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -288,8 +315,10 @@ def display_program():
     info.push_constant("FLOAT", "exposure")
     info.push_constant("FLOAT", "opacity")
     info.push_constant("INT", "pass_count")
+    info.push_constant("FLOAT", "first_part")
     info.sampler(0, "FLOAT_2D", "passes")
     info.sampler(1, "FLOAT_2D", "depths")
     info.sampler(2, "FLOAT_3D", "display_table")
+    info.sampler(3, "FLOAT_2D", "first_picture")
     info.depth_write("ANY")
     return compile_drawing(info, "picture/cover.vert", "picture/display.frag")

@@ -19,6 +19,9 @@ SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 # specks: share of each neighbor along an axis. A carried history has little noise and would be blurred.
 _SPREADS, _SPREADS_WITH_HISTORY = (0.25, 0.2, 0.15, 0.1), (0.15,)
 
+# How much of the first picture is shown after each pass, as its coverage has less noise than that of single samples.
+_FIRST_PARTS = (1.0, 0.55, 0.35, 0.2, 0.1)
+
 
 def samples_per_side():
     """Samples along each side of a pixel in each pass: fewer with software rendering, for responsiveness."""
@@ -43,6 +46,8 @@ class HairPicture:
         self._pass = VisibilityBuffer(*self._detail.buffer_size)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
         self._depth = gpu.types.GPUTexture(self.size, format="R32F")
+        self._first_picture = None  # of `_draw_first_picture`, None without
+        self._first_texture = None
         self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color)
 
     @property
@@ -64,7 +69,7 @@ class HairPicture:
             self._history.forget()
             self._spreads = _SPREADS
             self._first_turn = 0
-        self.pass_count = 0
+        self.pass_count, self._first_picture = 0, None
 
     def add_pass(
         self,
@@ -98,10 +103,13 @@ class HairPicture:
                 scene_drawing.draw_viewport_shadow(drawn, view)
             elif not is_see_through:
                 scene_drawing.draw_hiding(drawn, view, clip_planes)
-        scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True, clip_planes=clip_planes)
+        is_counted = self.pass_count == 0 and self._detail.per_side == 1 and self._spreads is _SPREADS
+        scene_drawing.draw_hair(drawn, view, self._pass, True, clip_planes, is_counted)
         if is_outlined:
             outline.add_seen(self._pass, self._detail)
         self._accumulate()
+        if is_counted and self._pass.covered is not None:
+            self._draw_first_picture()
         self.pass_count += 1
         part_left = 1.0 - self.pass_count / self._pass_total
         light = self._color, self.pass_count
@@ -130,6 +138,25 @@ class HairPicture:
             program.uniform_float("spread", self._spreads[self.pass_count] if is_shared else 0.0)
             drawing.dispatch_over(program, self.size)
 
+    def _draw_first_picture(self):
+        """Draw the first pass with the coverage of many lines through each pixel."""
+        if self._first_texture is None:
+            self._first_texture = gpu.types.GPUTexture(self.size, format=scene_programs.PICTURE_FORMAT)
+        self._first_picture = self._first_texture
+        program = scene_programs.first_picture_program()
+        samplers = {"picture": self._pass.color, "covered": self._pass.covered}
+        with drawing.bound(program, {}, samplers):
+            program.image("first_picture", self._first_picture)
+            program.uniform_int("first_place", self._detail.corner)
+            drawing.dispatch_over(program, self.size)
+
+    @property
+    def _first_part(self):
+        """How much of the first picture is shown."""
+        if self._first_picture is None or self.pass_count > len(_FIRST_PARTS):
+            return 0.0
+        return _FIRST_PARTS[self.pass_count - 1]
+
     def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
         """Draw the picture over the bound viewport.
 
@@ -144,7 +171,9 @@ class HairPicture:
         program.uniform_float("opacity", opacity)
         carried = self._history.picture
         program.uniform_int("pass_count", self.pass_count if carried is None else 1)
+        program.uniform_float("first_part", self._first_part if carried is None else 0.0)
         program.uniform_sampler("passes", self._color if carried is None else carried)
+        program.uniform_sampler("first_picture", self._color if self._first_picture is None else self._first_picture)
         program.uniform_sampler("depths", self._depth)
         program.uniform_sampler("display_table", display_table)
         # Depth is not written: surfaces occlude guides, but the hair around them does not.
@@ -166,14 +195,20 @@ class HairPicture:
         return self._pass.hair_near(side * (x - left) + side // 2, side * (y - bottom) + side // 2, side * reach)
 
     def read(self):
-        """Return (height, width, 4) float32: premultiplied linear light, bottom row first."""
+        """Return (height, width, 4) float32: the mean of the passes, premultiplied linear light, bottom row first."""
         with self._sum.bind():  # a framebuffer has no size before it is bound
             pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
 
     def read_shown(self):
-        """`read` of the picture that `show` draws, which may include the history of former pictures."""
-        return self.read() if self._history.picture is None else self._history.read()
+        """`read` of the picture that `show` draws, which may include former pictures or the first."""
+        if self._history.picture is not None:
+            return self._history.read()
+        light, part = self.read(), self._first_part
+        if not part:
+            return light
+        first = np.array(self._first_picture.read(), np.float32).reshape(light.shape)
+        return (1.0 - part) * light + part * first
 
 
 def table_texture(table):
