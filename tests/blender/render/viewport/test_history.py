@@ -47,6 +47,11 @@ def rest(picture, drawn, view):
     return picture.read()
 
 
+def still_picture(kind, drawn, view):
+    """Return a picture at rest; of hair with nine samples per pixel and pass, which takes a ninth of the passes."""
+    return rest(new_picture(kind, side=3), drawn, view)
+
+
 def turn_object(degrees):
     bpy.data.objects["Sphere"].rotation_euler.z = np.radians(degrees)
 
@@ -110,7 +115,7 @@ def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
     assert not np.array_equal(picture.read_shown(), picture.read())
     last = rest(picture, drawn, camera())
     np.testing.assert_array_equal(picture.read_shown(), last)
-    np.testing.assert_allclose(last.mean(axis=(0, 1)), rest(new_picture(kind), drawn, camera()).mean(axis=(0, 1)), 0.02)
+    np.testing.assert_allclose(last.mean(axis=(0, 1)), still_picture(kind, drawn, camera()).mean(axis=(0, 1)), 0.02)
 
 
 @even_guides
@@ -124,7 +129,7 @@ def test_nothing_remains_where_something_has_been(lit, kind):
         bpy.data.objects["Sphere"].location.x = 0.45 * (frame + 1)
         drawn, view = read_drawn(), camera()
         shown = move(picture, drawn, view)
-        is_there = rest(new_picture(kind), drawn, view)[..., 3] > 0.0
+        is_there = still_picture(kind, drawn, view)[..., 3] > 0.0
         # A pixel is carried with what is beside it.
         left = was_there & ~binary_dilation(is_there, iterations=5)
         was_there |= is_there
@@ -150,7 +155,7 @@ def test_light_that_changes_is_shown_at_once(lit):
     for energy in (4.0, 0.5, 3.0):
         bpy.data.objects["Sun"].data.energy = energy
         drawn = read_drawn()
-        shown, still = move(picture, drawn, camera()), rest(new_picture("HAIR"), drawn, camera())
+        shown, still = move(picture, drawn, camera()), still_picture("HAIR", drawn, camera())
         np.testing.assert_allclose(shown.mean(axis=(0, 1)), still.mean(axis=(0, 1)), rtol=0.02)
         parts = [of.reshape(8, side, 8, side, 4).mean(axis=(1, 3)) for of in (shown, still)]
         np.testing.assert_allclose(*parts, rtol=0.1, atol=0.1 * parts[1].max())
@@ -279,7 +284,7 @@ def test_hair_is_carried_where_it_moves(lit, push):
         push(frame)
         drawn, view = read_drawn(), camera()
         shown = move(picture, drawn, view)
-    still = rest(new_picture("HAIR"), drawn, view)
+    still = still_picture("HAIR", drawn, view)
     columns = np.arange(SIZE)
     middles = [(of[..., 3].sum(axis=0) * columns).sum() / of[..., 3].sum() for of in (shown, still)]
     assert abs(middles[0] - middles[1]) < 0.5
@@ -309,6 +314,6 @@ def test_strands_that_are_left_out_leave_no_trace(thin):
     thin.data.vellus.hair.strand_count = 1000
     bpy.context.view_layer.update()
     drawn, view = read_drawn(), camera()
-    still = rest(new_picture("HAIR"), drawn, view)
+    still = still_picture("HAIR", drawn, view)
     left = [move(picture, drawn, view).mean() - still.mean() for _ in range(4)]
     assert abs(left[-1]) < 0.12 * abs(before.mean() - still.mean())
