@@ -15,6 +15,7 @@ from tests.desktop.haircuts.hands import (
     lines,
     mirrored,
     press,
+    rename,
     select,
     style,
     vary,
@@ -196,6 +197,48 @@ FADE = (
     press("vellus.apply_preset", preset="BLACK"),
 )
 
+# Short, fine hairs along the hairline, of a hair system of their own.
+BABY_HAIR = (
+    select("Head"),
+    press("object.vertex_group_add"),
+    press("paint.weight_paint_toggle"),
+    mirrored(),
+    view(*FRONT),
+    weights(1.0, 0.008, ((0.0, -0.137, 0.804), (0.030, -0.131, 0.801), (0.055, -0.114, 0.790), (0.065, -0.102, 0.781))),
+    view(1, -0.4, 0.1),
+    weights(
+        1.0, 0.008, ((0.065, -0.10, 0.780), (0.070, -0.080, 0.757), (0.072, -0.066, 0.741), (0.073, -0.036, 0.743))
+    ),
+    view(0.5, 1, -0.4),
+    weights(1.0, 0.008, ((0.061, -0.018, 0.710), (0.051, -0.005, 0.695), (0.030, 0.016, 0.685), (0.0, 0.019, 0.684))),
+    press("paint.weight_paint_toggle"),
+    *grown(0.022, mask="Group", length_variation=0.5, drape=False, gravity=0.0, lift=0.25, tilt=0.25),
+    view(*FRONT),
+    lines(
+        "vellus.draw_flow",
+        ((0.0, -0.140, 0.795), (0.0, -0.110, 0.830)),
+        *both_sides(
+            ((0.040, -0.130, 0.790), (0.045, -0.10, 0.820)),
+            ((0.070, -0.090, 0.760), (0.078, -0.06, 0.785)),
+        ),
+    ),
+    view(*BACK),
+    lines(
+        "vellus.draw_flow",
+        ((0.0, 0.02, 0.685), (0.0, 0.045, 0.73)),
+        *both_sides(((0.05, 0.0, 0.70), (0.06, 0.02, 0.74))),
+    ),
+    fields("hair", strand_count=2500, radius=2.5e-5),
+    press("vellus.add_style", style="FRIZZ"),
+    fields("Frizz", amplitude=5.0e-4, wavelength=0.03),
+)
+
+
+def with_baby_hair(look):
+    """Baby hair of a look, as a hair system of its own before the haircut."""
+    return (*BABY_HAIR, press("vellus.apply_preset", preset=look), rename("Baby Hair"))
+
+
 FLYAWAYS = (  # a few hairs that stand out
     press("vellus.add_style", style="FRIZZ"),
     fields("Frizz", amplitude=2.0e-4, wavelength=0.05, stray=0.02, stray_gain=12.0),
@@ -214,10 +257,11 @@ PONYTAIL = (
 )
 
 BUN = (
+    *with_baby_hair("GINGER"),
     *grown(0.36, drape=False),
     view(*BACK),
     lines("vellus.draw_tie", ((0.0, 0.055, 0.80), (0.0, 0.055, 0.83))),
-    select("Head"),
+    select("Hair"),
     press("vellus.gather_guides", shape="BUN"),
     fields("hair", point_count=97),  # the coil bends without corners
     *FLYAWAYS,

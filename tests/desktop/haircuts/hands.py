@@ -123,6 +123,17 @@ def view(x, y, z, distance=0.62, middle=(0.0, -0.03, 0.72)):
     return act
 
 
+def rename(title):
+    """Double-click the name of the hair system in the list of the Hair Systems panel, and type another name."""
+
+    def act():
+        count.fields += 1
+        hair().vellus_system.title = title
+        yield from settled()
+
+    return act
+
+
 def style(preset):
     """Choose a style preset with as many strands as the picture has: presets fit locks to the spacing of strands."""
 
