@@ -107,11 +107,22 @@ def _sizes_in(view, strands, to_world):
     The diameter of hair with an uneven scale is measured along the axis with the smallest scale. Both numbers are very
     large if the viewer is inside of the hair's sphere.
     """
-    centres, radii = drawing.bounding_spheres(strands, to_world)
+    centres, radii, unevenness = _shape(strands, to_world)
     distances = np.linalg.norm(view["eye"][..., None, :3] - centres, axis=-1) - radii
     per_unit = np.repeat(view["pixels_per_unit"].astype(np.float64)[..., None], len(to_world), axis=-1)
     nearest = np.divide(per_unit, distances, out=np.full(per_unit.shape, _INSIDE), where=distances > 0.0)
     per_unit = np.where(view["is_perspective"][..., None] != 0, nearest, per_unit)
-    scales = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
-    unevenness = np.divide(scales[:, 2], scales[:, 0], out=np.ones(len(scales)), where=scales[:, 0] > 0.0)
     return per_unit, 2.0 * radii * per_unit * unevenness
+
+
+def _shape(strands, to_world):
+    """Return (N, 3) centers and (N,) radii of spheres around `StrandsOnGPU` at (N, 4, 4) places, and (N,) smallest
+    scales divided by the largest; computed again only for other strands or places.
+    """
+    key = to_world.tobytes()
+    if key not in strands.shapes:
+        strands.shapes.clear()
+        scales = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
+        unevenness = np.divide(scales[:, 2], scales[:, 0], out=np.ones(len(scales)), where=scales[:, 0] > 0.0)
+        strands.shapes[key] = *drawing.bounding_spheres(strands, to_world), unevenness
+    return strands.shapes[key]

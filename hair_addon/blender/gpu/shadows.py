@@ -445,7 +445,7 @@ def _blur_of(light, size):
     is_sun = light["kind"] == SUN
     angle = light["radius"] / (1.0 if is_sun else light["near"] + 0.5 * light["extent"])
     # The standard deviation of a disk along an axis is half its radius.
-    return float(np.clip(0.5 * angle * _SHADE_DISTANCE * size, _LEAST_BLUR, _MOST_BLUR * size))
+    return float(min(max(0.5 * angle * _SHADE_DISTANCE * size, _LEAST_BLUR), _MOST_BLUR * size))
 
 
 def _look_at(eye, forward):

@@ -84,6 +84,11 @@ class StrandsOnGPU:
         """(2, 3): least and greatest coordinates; waits until the GPU has made the strands."""
         return self.read_bounds()
 
+    @cached_property
+    def shapes(self) -> dict:
+        """{bytes of places: their shapes} of level_of_detail.py; changed strands begin without them."""
+        return {}
+
     @property
     def are_bounds_pending(self) -> bool:
         """Whether reading `bounds` may wait for the GPU."""

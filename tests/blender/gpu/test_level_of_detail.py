@@ -308,3 +308,22 @@ def test_strands_without_width_or_length_are_drawn_around_the_viewer(blender):
     thin = strand_textures.upload_strands(points, np.zeros(points.shape[:2], np.float32))
     short = strand_textures.upload_strands(np.repeat(points[:, :1], 9, axis=1), np.full((3000, 9), 1e-4, np.float32))
     assert steps_from(thin, 0.0).point_count == 9 and steps_from(short, 0.0).strand_count == 3000
+
+
+def test_hair_is_measured_again_only_if_it_or_its_place_changes(many, monkeypatch):
+    """A view that turns does not measure unchanged hair; other points and other places have their own sizes."""
+    calls, real = [], drawing.bounding_spheres
+    monkeypatch.setattr(drawing, "bounding_spheres", lambda *given: calls.append(1) or real(*given))
+    few = strand_textures.upload_strands(many.points[:20_000], many.radii[:20_000])
+    view, moved = drawing.view_record(*seen_from(60.0), SIZE, least_width=1.0), np.diag([-0.5, 0.5, 0.1, 1.0])
+    for distance in (40.0, 50.0, 60.0):
+        steps_from(few, distance)
+    assert len(calls) == 1
+    turned = steps_of(few, view, moved)
+    changed = strand_textures.with_points(few, few.points * np.float32(0.5))
+    found = steps_of(changed, view), turned, steps_of(few, view)
+    assert len(calls) == 4
+    assert len({one.strand_count for one in found}) == 3
+    new = strand_textures.upload_strands(changed.points, few.radii)
+    alone = strand_textures.upload_strands(few.points, few.radii)
+    assert found == (steps_of(new, view), steps_of(alone, view, moved), steps_of(few, view))
