@@ -343,8 +343,14 @@ def _placed(views, casts, steps, is_steady, counted):
             records = _records(strands, seen_from, to_world, steps, is_steady)
             each.append((strands, records, _fewer(records, counted)))
         for place, index in enumerate(chosen):
-            found[index] = [(strands, *(records[place] for records in both)) for strands, *both in each]
+            found[index] = [_in_view(*one, place) for one in each]
     return found
+
+
+def _in_view(strands, records, counted, place):
+    """Return (StrandsOnGPU, (N,) records, (N,) counted records) of a view; the same object if all are counted."""
+    own = records[place]
+    return strands, own, own if counted is records else counted[place]
 
 
 def _records(strands, views, to_world, steps, is_steady):

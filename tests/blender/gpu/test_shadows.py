@@ -7,7 +7,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, surface_textures
+from hair_addon.blender.gpu import (
+    ambient_visibility,
+    drawing,
+    shadows,
+    strand_batches,
+    strand_textures,
+    surface_textures,
+)
 from hair_addon.blender.gpu.programs import uniforms
 from hair_addon.core.errors import HairError
 
@@ -352,8 +359,15 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
         light["axis"][:3] = 0.0, 0.0, -1.0
     steps, calls, alone = drawing.Steps(strand_count=30), [], drawing.strand_records
     monkeypatch.setattr(drawing, "strand_records", lambda *given: calls.append(given[0]) or alone(*given))
-    maps = shadows.ShadowMaps(64, 4)
+    tables, table_of = [], strand_batches.objects_of
+    monkeypatch.setattr(strand_batches, "objects_of", lambda records: tables.append(1) or table_of(records))
+    maps = shadows.ShadowMaps(64, 4, in_compute=True)
+    maps.draw(lights, hair, [], steps, counted=30)
+    assert len(tables) == 2 * 4  # of linked objects, for each hair and light
+    assert calls == [many, few]
+    calls.clear()
     maps.draw(lights, hair, [], steps, counted=20)
+    assert len(tables) == 3 * 2 * 4  # others for the counted strands
     assert calls == [many, few]
     maps.draw(lights, hair, [], steps, lambda index: (hair[:2] if index == 1 else hair, []), counted=20)
     assert calls == [many, few] * 2 + [many]

@@ -230,6 +230,7 @@ def test_calls_of_a_frame_do_not_grow_with_the_number_of_heads(thin, monkeypatch
     for count in (3, 12):
         places = [Matrix.Translation((2.0 * (index % 4) - 3.0, 3.0 * (index // 4), 0.0)) for index in range(count)]
         others = link(hair, places)
+        uniforms.buffer_cache.clear()  # neither crowd finds buffers of the other
         drawn, picture = read(), hair_picture.HairPicture(SIZE, 2)
         view = WORLD_TO_VIEW.copy()
         for turn in range(3):
