@@ -292,7 +292,7 @@ def _follow_script(reports, edited, scene, depsgraph):
 
     Returns {guide Curves that have moved: None}, whose points are read later, as settings of the frame may change them.
     """
-    if scene_time.is_shown_moving() and len(bpy.app.handlers.frame_change_pre) == 1:
+    if _is_opening or (scene_time.is_shown_moving() and len(bpy.app.handlers.frame_change_pre) == 1):
         return {}
     if edited:
         separated = _follow_surfaces(edited, {one.data for one in edited}, [], depsgraph)
