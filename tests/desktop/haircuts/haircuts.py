@@ -247,10 +247,11 @@ FLYAWAYS = (  # a few hairs that stand out
 TAIL = ((0.0, 0.040, 0.795), (0.0, 0.062, 0.805), (0.0, 0.085, 0.785), (0.0, 0.090, 0.74), (0.0, 0.085, 0.60))
 
 PONYTAIL = (
+    *with_baby_hair("LIGHT_BROWN"),
     *grown(0.36, drape=False),
     view(*SIDE),
     curve("Tie", TAIL, depth="CURSOR"),
-    select("Head"),
+    select("Hair"),
     press("vellus.gather_guides", line="Tie", shape="PONYTAIL"),
     *FLYAWAYS,
     press("vellus.apply_preset", preset="LIGHT_BROWN"),
