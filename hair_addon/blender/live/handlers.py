@@ -230,8 +230,12 @@ def _mark_painted(images, depsgraph):
 
 @persistent
 def before_frame_change(_scene, _depsgraph):
-    """Remember setting values, to detect animated changes."""
+    """Remember setting values, to detect animated changes, and follow the frame after the handlers of scripts."""
     animated.remember()
+    after = bpy.app.handlers.frame_change_post
+    if after_frame_change in after and after[-1] is not after_frame_change:
+        after.remove(after_frame_change)
+        after.append(after_frame_change)
 
 
 @persistent
@@ -292,7 +296,8 @@ def _follow_script(reports, edited, scene, depsgraph):
 
     Returns {guide Curves that have moved: None}, whose points are read later, as settings of the frame may change them.
     """
-    if _is_opening or (scene_time.is_shown_moving() and len(bpy.app.handlers.frame_change_pre) == 1):
+    have_handlers = len(bpy.app.handlers.frame_change_pre) + len(bpy.app.handlers.frame_change_post) > 2
+    if _is_opening or (scene_time.is_shown_moving() and not have_handlers):
         return {}
     if edited:
         separated = _follow_surfaces(edited, {one.data for one in edited}, [], depsgraph)
@@ -300,8 +305,10 @@ def _follow_script(reports, edited, scene, depsgraph):
         live_layers.follow_masks({one for one in edited if one.mode == "OBJECT"}, depsgraph)
         if separated:
             copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
-    moved = [one for one in updates.originals(reports, is_geometry=True) if isinstance(one, bpy.types.Curves)]
-    return dict.fromkeys(_follow_geometry([one for one in moved if one.vellus.kind == "GUIDES"], depsgraph))
+    # What a handler has just moved is not reported yet.
+    reported = bpy.data.hair_curves if have_handlers else updates.originals(reports, is_geometry=True)
+    moved = [one for one in reported if isinstance(one, bpy.types.Curves) and one.vellus.kind == "GUIDES"]
+    return dict.fromkeys(_follow_geometry(moved, depsgraph))
 
 
 def _show_hidden():

@@ -20,6 +20,7 @@ from hair_addon.core.params import declared
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.tables import lookup_tables
+from tests.support.pictures import render_probe
 from tests.support.reading import attribute, points, vertex_positions, write_points
 
 
@@ -174,6 +175,32 @@ def test_edits_of_a_script_that_changes_the_frame_at_once_are_in_that_frame(hair
             edited.update_tag()
         update()
         np.testing.assert_array_equal(points(hair), after, err_msg=edit.__name__)
+
+
+@pytest.mark.parametrize("when", ["frame_change_pre", "frame_change_post"])
+def test_hair_follows_guides_that_a_handler_of_a_script_moves_in_each_frame(hair, when):
+    guides = bpy.data.objects["Guides"]
+    rest, length = points(guides), np.linalg.norm(np.diff(points(hair), axis=1), axis=-1).sum(axis=1).mean()
+
+    def shorten(scene, _depsgraph):
+        part = np.float32(1.0 - 0.05 * scene.frame_current)
+        moved = rest[:, :1] + part * (rest - rest[:, :1])
+        guides.data.attributes["position"].data.foreach_set("vector", moved.ravel())
+        guides.data.update_tag()
+
+    def shown(depsgraph):
+        strands = render_probe.read_points(depsgraph.objects["Hair"].data)
+        return np.linalg.norm(np.diff(strands, axis=1), axis=-1).sum(axis=1).mean() / length
+
+    handlers = getattr(bpy.app.handlers, when)
+    handlers.append(shorten)
+    try:
+        with render_probe.reading(shown) as render:
+            np.testing.assert_allclose(render(frames=(2, 6, 2)), [0.9, 0.8, 0.7], atol=0.01)
+        bpy.context.scene.frame_set(9)
+        assert shown(bpy.context.evaluated_depsgraph_get()) == pytest.approx(0.55, abs=0.01)
+    finally:
+        handlers.remove(shorten)
 
 
 def test_nothing_is_made_again_while_live_is_off(hair):
