@@ -276,6 +276,7 @@ OVER_SHOULDER = (
 )
 
 BRAIDS = (
+    *with_baby_hair("AUBURN"),
     *grown(0.36, drape=False, length_variation=0.0, guide_count=2000),
     view(*ABOVE),
     lines("vellus.draw_parting", MIDDLE, ((0.0, 0.03, 0.83), (0.0, 0.055, 0.80))),
@@ -285,7 +286,7 @@ BRAIDS = (
     cursor(*OVER_SHOULDER[0]),
     view(1.0, 0.0, 0.16),  # so that the line goes outward on its way down
     curve("Ties", OVER_SHOULDER, depth="CURSOR", is_mirrored=True),
-    select("Head"),
+    select("Hair"),
     press("vellus.gather_guides", line="Ties", shape="BRAID", tail_radius=0.019, tie_radius=0.009),
     fields("hair", point_count=97),  # locks bend without corners
     *FLYAWAYS,
