@@ -22,7 +22,7 @@ def test_operators_that_need_an_active_object_are_not_offered(no_window):
     offered = {
         name for name, operator in operators.items() if not hasattr(operator, "poll") or operator.poll(bpy.context)
     }
-    assert offered == {"remove_look", "remove_style_preset", "toggle_composite"}
+    assert offered == {"add_grooms", "remove_look", "remove_style_preset", "toggle_composite"}
 
 
 def test_grooms_are_offered_where_a_mesh_is_active(no_window):
