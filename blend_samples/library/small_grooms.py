@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small files of grooms: surfaces with few faces where no hair grows, few points, rounded coordinates.
 
-Grooms reach other meshes by UV maps or by the nearest surface, which need no more of the surface they were made on.
+UV maps and the nearest surface, by which grooms are transferred to other meshes, need no more of the surface.
 """
 
 from dataclasses import replace
@@ -17,16 +17,16 @@ from hair_addon.core.geometry.strands import curve_offsets
 from hair_addon.core.grooming import groom_passage, groom_transfer
 
 _STEP = 2.0**-16  # [m]: coordinates of points are multiples of it
-_FACES_KEPT = 0.15  # of all faces, by a surface that is thinned where no hair grows
-_MOST_LOST = 0.005  # of all guides: roots beside the UV map of the other surface
-_BOX_MARGIN = 0.01  # of a mesh's extents: vertices this near to its bounding box are not merged
-_AWAY = "away"  # vertex group of a surface, where no hair grows
+_FACES_KEPT = 0.15  # fraction of faces that remain when a surface is thinned where no hair grows
+_MOST_LOST = 0.005  # largest fraction of guides whose roots are outside of the other surface's UV map
+_BOX_MARGIN = 0.01  # relative to a mesh's extents: vertices this near to its bounding box are not merged
+_AWAY = "away"  # vertex group of a surface where no hair grows
 
 
 def small(hair, name, bare_surface, stride=1):
     """Return the `LibraryGroom` of hair on a surface with fewer faces and the same UV map.
 
-    bare_surface: () → mesh object, which replaces the open file; stride: every nth point of a guide stays.
+    bare_surface: a function that returns a mesh object in a new file; stride: every nth point of a guide stays.
     """
     groom = library_groom.take(hair, name, bpy.context.evaluated_depsgraph_get())
     groom = _every(_on(groom, bare_surface()), stride)

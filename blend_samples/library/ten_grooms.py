@@ -2,7 +2,7 @@
 """The ten grooms of the library, by code: `python blend_samples/library/ten_grooms.py` draws the sheet docs/grooms.png.
 
 From the left: pixie, bob, long wavy, curly, coily; braid, beard, eyebrows, short fur, long fur. Vellus draws each
-picture in half a minute. `make samples ARGS=grooms` saves them as small files in the add-on, which comes with them.
+picture in half a minute. `make samples ARGS=grooms` saves them as small files in the add-on's folder.
 """
 
 import argparse
@@ -53,7 +53,7 @@ class Sample:
     look_at: tuple[float, float, float]  # [m]
     lens: float  # [mm]
     bare_surface: Callable = head.load  # () → the object without its subdivision, for small files
-    stride: int = 1  # every nth point of guides is in small files
+    stride: int = 1  # small files keep every nth point of guides
 
 
 _HEAD, _LOW = (0.004, -0.045, 0.725), (0.004, -0.050, 0.690)
@@ -100,7 +100,7 @@ def main():
 def build_library(folder, names=()):
     """Save grooms, all by default, as small files with small pictures to a folder, and list the digests of its files.
 
-    The bytes of .blend files differ by each save: a changed list shows which files were made again.
+    Each save writes different bytes, so a changed list shows which files were saved again.
     """
     gpu.init()
     for name in names or SAMPLES:

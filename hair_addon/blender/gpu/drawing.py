@@ -200,8 +200,9 @@ FIRST_SHARE = 8
 
 @contextmanager
 def rasterizing(program, blocks, samplers, images, constants, part=WALK_ALL):
-    """Bind a compute program that rasterizes segments, for calls of `rasterize_strands`; binding takes longer than a
-    dispatch.
+    """Bind a compute program that rasterizes segments, for all calls of `rasterize_strands` inside of the context.
+
+    Binding takes longer than a dispatch.
 
     blocks: {instance: GPUUniformBuf} of all strands; samplers, images: {name: texture} that the program reads and
     writes; constants: {name: int}; part: `WALK_ALL` of the strands, `WALK_FIRST` or the remaining `WALK_OTHERS`.
@@ -215,7 +216,7 @@ def rasterizing(program, blocks, samplers, images, constants, part=WALK_ALL):
 
 
 def rasterize_strands(strands, program, record, blocks, constants, part=WALK_ALL):
-    """Rasterize strands by a program of `rasterizing`; record: of `strand_record`.
+    """Rasterize strands with the program that `rasterizing` has bound; record: of `strand_record`.
 
     blocks: {instance: GPUUniformBuf} of these strands, the record as "view"; constants: {name: int} of these strands;
     part: as for `rasterizing`.

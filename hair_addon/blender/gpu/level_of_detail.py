@@ -117,7 +117,7 @@ def _sizes_in(view, strands, to_world):
 
 def _shape(strands, to_world):
     """Return (N, 3) centers and (N,) radii of spheres around `StrandsOnGPU` at (N, 4, 4) places, and (N,) smallest
-    scales divided by the largest; computed again only for other strands or places.
+    scales divided by the largest; cached until the strands or their places change.
     """
     key = to_world.tobytes()
     if key not in strands.shapes:

@@ -94,7 +94,7 @@ class ShadowMaps:
         is_kept, before = is_steady and self._sphere is not None, self._sphere
         is_drawn = is_kept and any(strands.are_bounds_pending for strands, _to_world in hair)
         if is_drawn:
-            draw()  # before the bounds are read, which waits until the GPU has made the strands: most of them fit
+            draw()  # reading the bounds waits until the GPU has made the strands, and the last aim usually fits
         loose = drawing.bounding_sphere(hair)
         self._sphere = _steady(loose, before) if is_kept else loose
         if not (is_drawn and self._sphere is before):
@@ -332,7 +332,7 @@ def _placed(views, casts, steps, is_steady, counted):
     """Return {light's index: [(StrandsOnGPU, (N,) `_records`, (N,) records of counted strands)]}.
 
     views: {light's index: view}; casts: {light's index: (hair, surfaces)}; the rest as for `ShadowMaps.draw`. Records
-    of lights with the same hair are computed together, as each call has a cost.
+    of lights with the same hair are computed in one call, as each call has a cost.
     """
     found, indices = {}, list(views)
     for group in strand_batches.groups_of(tuple(map(id, casts[index][0])) for index in indices):
@@ -348,7 +348,7 @@ def _placed(views, casts, steps, is_steady, counted):
 
 
 def _in_view(strands, records, counted, place):
-    """Return (StrandsOnGPU, (N,) records, (N,) counted records) of a view; the same object if all are counted."""
+    """Return (StrandsOnGPU, (N,) records, (N,) counted records) of a view; both are one object if all are counted."""
     own = records[place]
     return strands, own, own if counted is records else counted[place]
 

@@ -101,7 +101,7 @@ class Objects:
         self.count, self.last_segment = len(records), first + strand_count * (points - 1) - 1
 
     def rasterize(self, strands, program, blocks, constants, part=drawing.WALK_ALL):
-        """Rasterize the segments of all objects by a program of `drawing.rasterizing`; see `rasterize_strands`."""
+        """Rasterize all objects with the program that `drawing.rasterizing` has bound; see `rasterize_strands`."""
         if not self._group_counts[part]:
             return
         drawing.provide(program, blocks, {**drawing.strand_samplers(strands), "objects": self.texture})

@@ -86,7 +86,7 @@ class StrandsOnGPU:
 
     @cached_property
     def shapes(self) -> dict:
-        """{bytes of places: their shapes} of level_of_detail.py; changed strands begin without them."""
+        """Cache of level_of_detail.py: {bytes of places: shapes}; empty for changed strands."""
         return {}
 
     @property

@@ -136,8 +136,8 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
         self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # farthest depth in each tile
-        self._parts_of_samples = None
-        # Parts of samples that the last hair covers: bits of visibility/covered_parts.glsl, if they are counted.
+        self._covered_texture = None
+        # Parts of samples that the last hair covers, as bits of visibility/covered_parts.glsl; None if not counted.
         self.covered = None
         self._seen_runs = None  # a texel for each run of segments
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
@@ -403,7 +403,7 @@ class VisibilityBuffer:
         length = sum(placed.total_length for placed in self._hair)
         if count < _FEW_SEGMENTS or length < _SHORT_SEGMENTS * count:
             if is_counted:
-                self._clear_parts()
+                self._clear_covered()
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
@@ -414,10 +414,10 @@ class VisibilityBuffer:
         self._find_farthest()
         self._walk(all_blocks, drawing.WALK_ALL, is_depth=False, are_tiles_known=True)
 
-    def _clear_parts(self):
-        if self._parts_of_samples is None:
-            self._parts_of_samples = gpu.types.GPUTexture(self.size, format="R32UI")
-        self.covered = self._parts_of_samples
+    def _clear_covered(self):
+        if self._covered_texture is None:
+            self._covered_texture = gpu.types.GPUTexture(self.size, format="R32UI")
+        self.covered = self._covered_texture
         self.covered.clear(format="UINT", value=(0,))
 
     def _provide_runs(self, count):

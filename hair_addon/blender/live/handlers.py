@@ -230,7 +230,7 @@ def _mark_painted(images, depsgraph):
 
 @persistent
 def before_frame_change(_scene, _depsgraph):
-    """Remember setting values, to detect animated changes, and follow the frame after the handlers of scripts."""
+    """Remember setting values, to detect animated changes, and move `after_frame_change` behind handlers of scripts."""
     animated.remember()
     after = bpy.app.handlers.frame_change_post
     if after_frame_change in after and after[-1] is not after_frame_change:
@@ -260,11 +260,11 @@ def after_frame_change(scene, depsgraph):
     try:
         combed = _follow_script(reports, edited, scene, depsgraph)
         moved = live_layers.follow_frame(depsgraph) | combed
-        has_other_ramps = stale_marks.follow_keyed_ramps(depsgraph)
+        have_ramps_changed = stale_marks.follow_keyed_ramps(depsgraph)
         is_outdated = (
             not is_render and not scene_time.is_shown_moving() and any(map(_is_outdated, bpy.data.hair_curves))
         )
-        if animated.follow(depsgraph) or has_other_ramps or moved or is_outdated:
+        if animated.follow(depsgraph) or have_ramps_changed or moved or is_outdated:
             # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
             evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
             simulated_hair.note_combed(combed, scene)
@@ -277,9 +277,9 @@ def after_frame_change(scene, depsgraph):
 
 
 def _edited_by_script(reports, deformed):
-    """Return the surfaces whose meshes a script edited just before it changed the frame: no update reports them.
+    """Return the surfaces whose meshes a script edited just before it changed the frame; no other update reports them.
 
-    Windows update before they play. Meshes with animation are reported in each frame, also if nothing edited them.
+    Playback begins after an update. Animated meshes are left out, as they are reported in each frame, edited or not.
     """
     if scene_time.is_shown_moving():
         return set()
@@ -305,7 +305,7 @@ def _follow_script(reports, edited, scene, depsgraph):
         live_layers.follow_masks({one for one in edited if one.mode == "OBJECT"}, depsgraph)
         if separated:
             copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
-    # What a handler has just moved is not reported yet.
+    # Guides that a handler has just moved are not reported yet.
     reported = bpy.data.hair_curves if have_handlers else updates.originals(reports, is_geometry=True)
     moved = [one for one in reported if isinstance(one, bpy.types.Curves) and one.vellus.kind == "GUIDES"]
     return dict.fromkeys(_follow_geometry(moved, depsgraph))

@@ -302,7 +302,7 @@ def follow_ramps():
 
 
 def follow_keyed_ramps(depsgraph):
-    """Mark hair and guides whose maps have keyed color ramps that changed in a frame; returns whether any did."""
+    """Mark hair and guides if keyed color ramps of their maps have changed in a frame; returns whether any has."""
     is_render, is_changed = scene_time.is_rendered(depsgraph), False
     for hair in bpy.data.hair_curves:
         for item in animated.keyed_ramps(hair) if hair.is_editable else ():
@@ -313,7 +313,7 @@ def follow_keyed_ramps(depsgraph):
 
 
 def _follow_ramp_of_map(hair, item, name):
-    """Mark hair whose map has another ramp than at the last update; returns whether it has."""
+    """Mark hair if the ramp of its map has changed since the last update; returns whether it has."""
     key = ramp_nodes.text_of(getattr(item, f"{name}_tree"))
     is_changed = key != getattr(item, f"{name}_key") and hair.is_editable
     if is_changed:

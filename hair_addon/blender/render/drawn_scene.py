@@ -188,7 +188,7 @@ def read(
         instances=instances,
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
-    # Lights first: while the GPU makes strands, only their maps can be drawn without the bounds of these strands.
+    # Lights first: only their maps can be drawn without the bounds of strands, which the GPU may still be making.
     drawn = _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
     (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
     return replace(drawn, hair_visibility=hair_seen, surface_visibility=surfaces_seen, renewal=renewal)

@@ -38,7 +38,7 @@ def are_keyed(datablock):
 
 
 def keyed_ramps(curves):
-    """Return [map] of the maps of Curves whose color ramp may be animated or driven."""
+    """Return the maps of Curves whose color ramps may be animated or driven."""
     maps = curves.vellus.maps
     return [item for item in maps if item.ramp_tree is not None and are_keyed(item.ramp_tree)]
 

@@ -28,7 +28,7 @@ def _names(_owner, _context, typed):
 
 
 def first_name():
-    """Return the name of the first asset library to save to, empty if there is none."""
+    """Return the name of the first asset library that grooms can be saved to, empty if there is none."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
     return next((library.name for library in libraries if not _is_shipped(library)), "")
 
@@ -46,7 +46,7 @@ def shipped_name():
 def add_shipped():
     """Add the folder of the grooms that come with the add-on to the asset libraries; returns the library's name.
 
-    The folder is not copied, so that updates of the add-on bring its present grooms.
+    The folder is not copied, so updates of the add-on also update its grooms.
     """
     if not shipped_name():
         bpy.context.preferences.filepaths.asset_libraries.new(name=_SHIPPED_NAME, directory=str(SHIPPED))

@@ -78,7 +78,7 @@ def text_of(tree: bpy.types.NodeTree | None) -> str:
 
 
 def copy_colors(tree: bpy.types.NodeTree, shown: bpy.types.NodeTree) -> None:
-    """Give a node group the color ramp of its evaluated copy `shown`, stop by stop: keys name stops by their index."""
+    """Copy the color ramp of the evaluated node group `shown` stop by stop, as keyframes refer to stops by index."""
     to, source = node_of(tree), node_of(shown)
     if to is None or source is None or not is_color(to):
         return

@@ -140,8 +140,8 @@ def test_a_moved_surface_vertex_moves_the_roots(hair, sphere):
 
 
 def test_edits_of_a_script_that_changes_the_frame_at_once_are_in_that_frame(hair, sphere):
-    """A change of the frame takes the reports of guides, vertices, weights and settings that a script edited before it:
-    the hair is as after an update.
+    """If a script edits guides, vertices, weights or settings and then changes the frame, the hair is as after an
+    update.
     """
     guides, scene = bpy.data.objects["Guides"], bpy.context.scene
     weights = sphere.vertex_groups.new(name="Length")

@@ -235,7 +235,7 @@ BABY_HAIR = (
 
 
 def with_baby_hair(look):
-    """Baby hair of a look, as a hair system of its own before the haircut."""
+    """Baby hair with a look, as a hair system of its own before the haircut."""
     return (*BABY_HAIR, press("vellus.apply_preset", preset=look), rename("Baby Hair"))
 
 

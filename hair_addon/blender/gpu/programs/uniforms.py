@@ -306,18 +306,18 @@ def fill(settings):
     return record
 
 
-# Bytes of a record → its buffer. Most records of a frame are those of the last frame, and graphics drivers take longer
+# Bytes of a record → its buffer. Most records of a frame equal those of the last one, and graphics drivers take longer
 # to allocate and fill a buffer than to draw with it.
 buffer_cache = Cache(capacity=512)
 
 
 def uniform_buffer(record):
-    """Return a GPUUniformBuf with the bytes of a record, which is shared and must not be updated."""
+    """Return the shared GPUUniformBuf with the bytes of a record. It must not be updated."""
     return buffer_cache.get(record.tobytes(), lambda: own_uniform_buffer(record))
 
 
 def own_uniform_buffer(record):
-    """Return a new GPUUniformBuf with the bytes of a record, which may be updated."""
+    """Return a new GPUUniformBuf with the bytes of a record. It may be updated."""
     return gpu.types.GPUUniformBuf(bytes_of(record))
 
 

@@ -176,11 +176,12 @@ def _is_of_another(blender_scene):
 
 
 def filmed_scene(blender_scene):
-    """Return the scene with the samples and the shutter of a rendered scene: of a hair scene the scene that it belongs
-    to, whose keys apply in the frame.
+    """Return the scene whose samples and shutter a render uses.
+
+    For a hair scene this is its background set, whose keyframes apply in each frame.
     """
-    is_its = _is_ours(blender_scene) and blender_scene.background_set is not None
-    return blender_scene.background_set if is_its else blender_scene
+    is_composited = _is_ours(blender_scene) and blender_scene.background_set is not None
+    return blender_scene.background_set if is_composited else blender_scene
 
 
 def is_in_sequence(blender_scene):

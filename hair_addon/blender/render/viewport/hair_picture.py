@@ -19,7 +19,7 @@ SAMPLE_COUNT = 32  # per pixel, in all passes of a picture
 # specks: share of each neighbor along an axis. A carried history has little noise and would be blurred.
 _SPREADS, _SPREADS_WITH_HISTORY = (0.25, 0.2, 0.15, 0.1), (0.15,)
 
-# How much of the first picture is shown after each pass, as its coverage has less noise than that of single samples.
+# Share of the first picture in the picture after each pass: its coverage has less noise than that of single samples.
 _FIRST_PARTS = (1.0, 0.55, 0.35, 0.2, 0.1)
 
 
@@ -46,7 +46,7 @@ class HairPicture:
         self._pass = VisibilityBuffer(*self._detail.buffer_size)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
         self._depth = gpu.types.GPUTexture(self.size, format="R32F")
-        self._first_picture = None  # of `_draw_first_picture`, None without
+        self._first_picture = None  # texture of `_draw_first_picture`, None if it was not drawn
         self._first_texture = None
         self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color)
 
@@ -152,7 +152,7 @@ class HairPicture:
 
     @property
     def _first_part(self):
-        """How much of the first picture is shown."""
+        """The share of the first picture in the picture that `show` draws."""
         if self._first_picture is None or self.pass_count > len(_FIRST_PARTS):
             return 0.0
         return _FIRST_PARTS[self.pass_count - 1]
@@ -201,7 +201,7 @@ class HairPicture:
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
 
     def read_shown(self):
-        """`read` of the picture that `show` draws, which may include former pictures or the first."""
+        """`read` of the picture that `show` draws, which may include former pictures or the first picture."""
         if self._history.picture is not None:
             return self._history.read()
         light, part = self.read(), self._first_part

@@ -129,7 +129,7 @@ class VELLUS_OT_add_grooms(HairOperator, bpy.types.Operator):
         asset_libraries.show_changes(name)
         if context.area is not None and context.area.type == "VIEW_3D":
             context.area.spaces.active.show_region_asset_shelf = True
-        return "The asset library {name} has the grooms that come with Vellus", {"name": name}
+        return "The asset library {name} contains the grooms that come with Vellus", {"name": name}
 
 
 CLASSES = (

@@ -22,7 +22,7 @@ from hair_addon.core.long_work import run_now
 from tests.support.pairs import share_of
 
 FILES = sorted(asset_libraries.SHIPPED.glob("*.blend"))
-MOST_BYTES = 3_000_000  # of all files: the zip has no more
+MOST_BYTES = 3_000_000  # of all files together
 
 
 def suzanne():
@@ -38,7 +38,7 @@ def surfaces():
 
 
 def lengths(points, counts):
-    """Return (G,) of guides of equal counts."""
+    """Return the lengths (G,) of guides with equal numbers of points."""
     guides = points.astype(np.float64).reshape(len(counts), -1, 3)
     return np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1)
 
@@ -85,7 +85,7 @@ def test_grooms_are_applied_with_their_numbers_and_without_messages(file):
 
 
 def test_files_are_listed_small_and_in_catalogs():
-    """A file that was made again changes the list of digests."""
+    """The list of digests names all files; together they are small."""
     lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}" for file in FILES]
     assert (asset_libraries.SHIPPED / "SHA256SUMS").read_text(encoding="utf-8").splitlines() == lines
     assert len(FILES) == 10 and sum(file.stat().st_size for file in FILES) < MOST_BYTES

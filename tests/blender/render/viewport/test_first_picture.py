@@ -125,7 +125,7 @@ def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
         outliers[per_side] = int((np.abs(on_skin - last_on_skin).max(axis=-1) > 0.3).sum())
     assert all(error <= MOST[per_side] and not specks for per_side, (error, specks) in found.items()), found
     assert 0 < outliers[2] and outliers[1] <= 0.5 * outliers[2], outliers
-    # The first picture goes over to the mean of the passes.
+    # The mean of the passes replaces the first picture by degrees.
     steps = [flip(*(displayed(light, management) for light in of[:2]))[is_hair].mean() for of in (lights[1], means)]
     assert steps[0] < 0.75 * steps[1], steps
     assert not np.array_equal(lights[1][4], means[4])
