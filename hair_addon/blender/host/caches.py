@@ -5,6 +5,7 @@ blender/live/invalidation.py lists every cache of the add-on; blender/live/event
 """
 
 from functools import wraps
+from threading import RLock
 
 
 class Cache:
@@ -15,23 +16,26 @@ class Cache:
 
     def __init__(self, capacity=None):
         self._values, self._capacity, self._least = {}, capacity, capacity
+        self._lock = RLock()  # a render runs in a thread beside viewports
 
     def __len__(self):
         return len(self._values)
 
     def get(self, key, make=None):
         """Return the value of a key. A missing value is computed by make() and stored; None without `make`."""
-        value = self._values.get(key)
-        if value is None:
-            return None if make is None else self.keep(key, make())
-        return value if self._capacity is None else self.keep(key, value)
+        with self._lock:
+            value = self._values.get(key)
+            if value is not None:
+                return value if self._capacity is None else self.keep(key, value)
+        return None if make is None else self.keep(key, make())
 
     def keep(self, key, value):
         """Set the value of a key, and return it."""
-        self._values.pop(key, None)
-        self._values[key] = value
-        while self._capacity is not None and len(self._values) > self._capacity:
-            del self._values[next(iter(self._values))]
+        with self._lock:
+            self._values.pop(key, None)
+            self._values[key] = value
+            while self._capacity is not None and len(self._values) > self._capacity:
+                del self._values[next(iter(self._values))]
         return value
 
     def make_room(self, count):
@@ -52,12 +56,15 @@ class Cache:
 
     def values(self):
         """Return all values, the least recently used first."""
-        return list(self._values.values())
+        with self._lock:
+            return list(self._values.values())
 
     def invalidate(self, key):
         """Drop the value of a key, as its inputs have changed."""
-        self._values.pop(key, None)
+        with self._lock:
+            self._values.pop(key, None)
 
     def clear(self):
         """Drop all values."""
-        self._values.clear()
+        with self._lock:
+            self._values.clear()

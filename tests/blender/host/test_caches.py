@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Values in caches are computed once, evicted, and computed again."""
 
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
 from hair_addon.blender.host.caches import Cache
 
 
@@ -79,3 +82,22 @@ def test_another_value_takes_the_place_of_the_one_before():
     cache.keep("a", 1)
     assert cache.keep("a", 2) == 2
     assert cache.values() == [2]
+
+
+def test_threads_share_a_full_cache():
+    """A render in a thread and viewports use the same caches: a value is not missed while another thread reads it."""
+    cache, switching = Cache(capacity=8), sys.getswitchinterval()
+
+    def use(own):
+        for turn in range(20_000):
+            assert cache.get((own, turn), lambda: own + 1) == own + 1
+            assert cache.get("shared") == "value"
+
+    cache.keep("shared", "value")
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(3) as threads:
+            assert list(threads.map(use, range(3))) == [None] * 3
+    finally:
+        sys.setswitchinterval(switching)
+    assert len(cache) == 8
