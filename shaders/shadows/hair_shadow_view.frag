@@ -3,7 +3,11 @@
 
 #include "shadows/hair_shadow.glsl"
 
+// Only hair has an alpha of 1: picture/accumulate.comp and picture/first_picture.comp tell both apart by it.
+const float MOST_ALPHA = 0.999;
+
 void main()
 {
-  color = vec4(vec3(0.0), 1.0 - dot(part_past_hair(false), vec3(1.0 / 3.0)));
+  float blocked = 1.0 - dot(part_past_hair(false), vec3(1.0 / 3.0));
+  color = vec4(vec3(0.0), min(blocked, MOST_ALPHA));
 }

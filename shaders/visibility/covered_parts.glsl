@@ -7,7 +7,8 @@ const float LINES = 16.0;  // half of the bits
 // Adds a segment in a column of samples: it covers rows from `rows.x` to `rows.y`, without jitter.
 void count_part(bool is_steep, int column, int last_row, vec2 rows, float along)
 {
-  float depth = mix(end_depths.x, end_depths.y, clamp(along, 0.0, 1.0));
+  vec2 nearest = end_depths - end_rises;  // of the side that faces the viewer, as the axis may lie in the surface
+  float depth = mix(nearest.x, nearest.y, clamp(along, 0.0, 1.0));
   int row = max(int(floor(rows.x)), 0);
   int last = min(int(floor(rows.y)), last_row);
   for (; row <= last; row++) {
@@ -21,10 +22,10 @@ void count_part(bool is_steep, int column, int last_row, vec2 rows, float along)
   }
 }
 
-// Adds a whole sample.
+// Adds a whole sample after `meet`, if strands are in front: elsewhere `depths` has the depth of the surface.
 void count_all(ivec2 place)
 {
-  if (uintBitsToFloat(imageLoad(depths, place).r) <= texelFetch(surface_depth, place, 0).r) {
+  if (uintBitsToFloat(imageLoad(depths, place).r) < texelFetch(surface_depth, place, 0).r) {
     imageAtomicOr(covered, place, 0xFFFFFFFFu);
   }
 }

@@ -173,6 +173,27 @@ def test_counted_parts_of_samples_are_those_that_strands_cover(rng, shading):
         assert filled(*given).covered is None
 
 
+def test_parts_are_counted_of_strands_whose_axis_is_in_a_surface(shading):
+    """Strands are round: their sides that face the viewer are in front, and seen."""
+    points = np.zeros((1, 2, 3), np.float32)
+    points[0, :, 0], points[..., 2] = [-0.3, 0.3], -1.0
+    radius = 2.0 * 0.4 / SIZE[1]
+    given = [(points, np.full((1, 2), radius, np.float32), np.eye(4))], PARALLEL, shading, True, 1.0 - 0.5 * radius
+    buffer = filled(*given, is_counted=True)
+    seen = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1]) < visibility_buffer.NO_SEGMENT
+    assert seen[:, : SIZE[0] // 2].any() and seen[:, SIZE[0] // 2 :].any()
+    assert np.array(buffer.covered.read(), np.uint32).reshape(SIZE[::-1])[seen].all()
+
+
+def test_no_parts_are_counted_of_wide_strands_behind_a_surface(shading):
+    """Neither along strands, nor at their round ends and bends."""
+    points = np.array([[[-0.3, -0.1, -1.0], [-0.2, 0.1, -1.0], [-0.1, -0.1, -1.0], [0.3, 0.1, -1.0]]], np.float32)
+    strand = [(points, np.full((1, 4), 4.0 * 0.4 / SIZE[1], np.float32), np.eye(4))]
+    buffer = filled(strand, PARALLEL, shading, True, 0.9, is_counted=True)
+    left, right = np.split(np.array(buffer.covered.read(), np.uint32).reshape(SIZE[::-1]), 2, axis=1)
+    assert not left.any() and right.any()
+
+
 def test_a_strand_behind_a_surface_is_hidden(shading):
     points = np.zeros((1, 2, 3), np.float32)
     points[0, :, 0], points[..., 2] = [-0.3, 0.3], -1.0

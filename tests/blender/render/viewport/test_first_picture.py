@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
+from hair_addon import api
 from hair_addon.blender.data.pictures import viewport_shading
-from hair_addon.blender.gpu import display_transform
+from hair_addon.blender.gpu import display_transform, visibility_buffer
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture
 from hair_addon.core.imaging.flip import flip
@@ -130,6 +131,31 @@ def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
     assert steps[0] < 0.75 * steps[1], steps
     assert not np.array_equal(lights[1][4], means[4])
     np.testing.assert_array_equal(lights[1][5], means[5])
+
+
+def test_the_first_picture_has_full_shadows(blender):
+    """The black shadow of dense hair under the only lamp is not taken for hair, whose alpha is 1."""
+    bpy.ops.wm.read_factory_settings(use_empty=False)
+    bpy.context.scene.world = None
+    bpy.data.objects["Light"].location = (0.0, 0.0, 6.0)
+    settings = api.GroomSettings(
+        api.GuideSettings(guide_count=50, length=1.0), api.HairSettings(strand_count=10_000, radius=0.03)
+    )
+    api.add_hair(bpy.data.objects["Cube"], settings)
+    view = camera()
+    bpy.ops.mesh.primitive_plane_add(size=30.0, location=(0.0, 0.0, -2.2))
+    bpy.context.view_layer.update()
+    drawn, _view, _management = drawn_in("lights")
+    picture = hair_picture.HairPicture(SIZE, 1)
+    picture.add_pass(drawn, *view, is_shadowed=True)
+    samples = picture._pass
+    light = np.array(samples.color.read(), np.float32)
+    is_hair = np.array(samples.segments.read(), np.int64) < visibility_buffer.NO_SEGMENT
+    assert samples.size == SIZE
+    assert (light[is_hair, 3] == 1.0).all()
+    is_full = ~is_hair & (light[..., 3] > 0.995)
+    assert is_full.mean() > 0.02
+    assert picture.read_shown()[is_full, 3].min() > 0.99
 
 
 def test_flip_is_a_difference_that_is_seen(rng):
