@@ -9,7 +9,7 @@ from ...core.errors import HairError
 from .translations import CONTEXT
 
 SHIPPED = Path(__file__).resolve().parents[2] / "grooms"  # folder of the grooms that come with the add-on
-_SHIPPED_NAME = "Vellus"
+_SHIPPED_NAME, _CHECKSUMS = "Vellus", "SHA256SUMS"
 
 # Blender's own numbers, used when it calls an operator for an asset.
 _KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4), ("CUSTOM", 100))
@@ -49,9 +49,22 @@ def add_shipped():
     The folder is not copied, so updates of the add-on also update its grooms.
     """
     if not shipped_name():
-        bpy.context.preferences.filepaths.asset_libraries.new(name=_SHIPPED_NAME, directory=str(SHIPPED))
+        libraries = bpy.context.preferences.filepaths.asset_libraries
+        former = next(filter(_is_former, libraries), None)
+        if former is None:
+            libraries.new(name=_SHIPPED_NAME, directory=str(SHIPPED))
+        else:
+            former.path = str(SHIPPED)
         bpy.context.preferences.is_dirty = True
     return shipped_name()
+
+
+def _is_former(library):
+    """Whether a library was added while the add-on was in another folder, as each version of Blender has its own."""
+    folder = Path(bpy.path.abspath(library.path))
+    if not library.name.startswith(_SHIPPED_NAME) or folder.parts[-2:] != SHIPPED.parts[-2:]:
+        return False
+    return not folder.exists() or (folder / _CHECKSUMS).exists()
 
 
 def folder_to_save(name):

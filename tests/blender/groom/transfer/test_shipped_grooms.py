@@ -111,3 +111,24 @@ def test_a_button_adds_the_library_once_and_nothing_is_saved_to_it(sphere):
             bpy.ops.vellus.save_groom(name="Mine", library="Vellus")
     finally:
         libraries.remove(libraries["Vellus"])
+
+
+def test_the_button_moves_the_library_of_another_version_and_no_other(tmp_path):
+    """Another version of Blender has the add-on in another folder, which may be deleted, or not."""
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    before = list(libraries.keys())
+    gone, kept, own = (tmp_path.joinpath(name, *asset_libraries.SHIPPED.parts[-2:]) for name in ("gone", "kept", "own"))
+    for folder in (kept, own):
+        folder.mkdir(parents=True)
+    (kept / "SHA256SUMS").touch()
+    for folder in (gone, kept):
+        try:
+            libraries.new(name="Vellus", directory=str(own))
+            libraries.new(name="Vellus", directory=str(folder))
+            assert bpy.ops.vellus.add_grooms() == {"FINISHED"}
+            assert list(libraries.keys()) == [*before, "Vellus", "Vellus.001"]
+            assert asset_libraries.folder_of("Vellus") == own
+            assert asset_libraries.folder_of("Vellus.001") == asset_libraries.SHIPPED
+        finally:
+            for library in [library for library in libraries if library.name not in before]:
+                libraries.remove(library)
