@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangle meshes as arrays: a file, a sphere, a square."""
+"""Triangle meshes as arrays: a file, a sphere, an octahedron, a square."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -47,6 +47,13 @@ def subdivided_sphere(levels, radius=1.0):
         vertices = np.concatenate([vertices, unique])
     vertices = radius * vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     return TriMesh(vertices.astype(np.float32), triangles.astype(np.int32))
+
+
+def octahedron():
+    """Return the octahedron with corners at a distance of one on the axes."""
+    corners = np.float32([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]])
+    faces = [(x, y, z)[:: 2 * ((x + y + z) % 2) - 1] for x in (0, 1) for y in (2, 3) for z in (4, 5)]
+    return TriMesh(corners, np.array(faces, np.int32))
 
 
 def split_in_four(mesh):

@@ -24,6 +24,7 @@ _MOST_STRETCH = 0.25  # largest RMS deviation from a similarity for UV maps that
 # Largest distance of a root or a mask from the surface, relative to the surface's size. Bounding boxes of heads with
 # large ears or long necks align scalps poorly: guides that lie a little aside are better than bald places.
 _REACH = 0.2
+_ASIDE = 0.1  # distance of a root from the surface, relative to the surface's size, beyond which it is not in its place
 _OUTSIDE = 1e-3  # largest distance of a mask from a UV layout, relative to the layout's size
 
 
@@ -88,6 +89,15 @@ def _by_agreeing_uv(source, target, roots):
     apart = np.sqrt(np.mean(np.sum((warp.places(before) - after) ** 2, axis=1)))
     spread = np.sqrt(np.mean(np.sum((after - after.mean(axis=0)) ** 2, axis=1)))
     return Passage("UV", places, None) if apart <= _MOST_STRETCH * spread else None
+
+
+def aside_count(source: TransferSurface, target: TransferSurface, roots: SurfacePoints, found: Passage) -> int:
+    """Return how many of the placed guides with roots (G) on the source are far from where the alignment puts them."""
+    if found.warp is None:
+        return 0
+    wanted = found.warp.places(positions(source.mesh, roots[found.places.kept]))
+    apart = np.linalg.norm(positions(target.mesh, found.places.roots) - wanted, axis=1)
+    return int((apart > _ASIDE * float(np.ptp(target.mesh.vertices, axis=0).max())).sum())
 
 
 def carried_weights(

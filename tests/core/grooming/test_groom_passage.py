@@ -9,11 +9,11 @@ from hair_addon.core.files import library_settings
 from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh, positions
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
-from hair_addon.core.grooming.groom_passage import carried_weights, passage
+from hair_addon.core.grooming.groom_passage import aside_count, carried_weights, passage
 from hair_addon.core.grooming.groom_transfer import TransferSurface
 from hair_addon.core.maps.map_settings import MapSettings
 from hair_addon.core.styling import clump, trim
-from tests.support.meshes import subdivided_sphere
+from tests.support.meshes import octahedron, subdivided_sphere
 
 TURN = np.linalg.qr(np.array([[0.4, -0.8, 0.3], [0.9, 0.2, -0.1], [0.1, 0.5, 0.9]]))[0]
 TURN *= np.sign(np.linalg.det(TURN))
@@ -70,6 +70,26 @@ def test_another_shape_takes_guides_to_its_nearest_surface(head):
     extent = np.ptp(other.vertices, axis=0) / np.ptp(mesh.vertices, axis=0)
     wanted = positions(mesh, roots)[found.places.kept] * extent
     assert np.linalg.norm(positions(other, found.places.roots) - wanted, axis=1).max() < 0.03
+
+
+def on_octahedron(points):
+    """Return the nearest points (N, 3) of an octahedron to points outside, by projection on a simplex."""
+    sizes = -np.sort(-np.abs(points), axis=1)
+    shifts = (np.cumsum(sizes, axis=1) - 1.0) / [1.0, 2.0, 3.0]
+    shift = np.take_along_axis(shifts, (sizes > shifts).sum(axis=1)[:, None] - 1, axis=1)
+    return np.sign(points) * np.maximum(np.abs(points) - shift, 0.0)
+
+
+def test_guides_far_from_their_places_are_counted(head):
+    """Of guides on a ball those over the middles of the faces of an octahedron in the same box, and none on a copy."""
+    _mesh, roots = head
+    ball = subdivided_sphere(3)
+    own, other = TransferSurface(ball), TransferSurface(octahedron())
+    away = np.linalg.norm(positions(ball, roots) - on_octahedron(positions(ball, roots)), axis=1)
+    found = passage(own, other, roots)
+    assert (found.method, found.places.far_count) == ("NEAREST", (away > 0.2 * 2.0).sum())
+    assert aside_count(own, other, roots, found) + found.places.lost_count == (away > 0.1 * 2.0).sum() > 10
+    assert aside_count(own, own, roots, passage(own, own, roots)) == 0
 
 
 def test_masks_come_along(head):

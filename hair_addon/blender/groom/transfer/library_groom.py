@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _GUIDE_RADIUS = 1.0 / 300.0  # of guides in viewports, by their length
 _UNEQUAL = 1e-4  # masks whose weights differ by less are equal
+_MANY = 0.2  # fraction of guides far from their places: the surfaces have other shapes
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,24 @@ class LibraryGroom:
 
 @dataclass(frozen=True)
 class Applied:
-    """Guide and hair Curves of a groom applied to a mesh object, and results to report."""
+    """Guide and hair Curves of a groom applied to a mesh object, and results to report.
+
+    lost_count, aside_count: guides without a place, and guides far from where the alignment puts them.
+    """
 
     made: HandMade
     method: str
     lost_count: int
+    aside_count: int
     guide_count: int
     left: tuple[str, ...]
 
     def notes(self) -> list[tuple[str, dict[str, Any]]]:
         """Return [(sentence, values)] to report to the user."""
+        many_aside = self.aside_count if self.aside_count > _MANY * self.guide_count else 0
         messages = [
             (self.lost_count, "{count} of {all} guides could not be placed on this surface and were left out.", {}),
+            (many_aside, "{count} of {all} guides are far from their places, as this mesh has another shape.", {}),
             (len(self.left), "Not part of the groom: {names}.", {"names": ", ".join(self.left)}),
         ]
         values = {"all": self.guide_count}
@@ -183,7 +190,8 @@ def adding_groom(
     unparted = replace(settings, hair=replace(settings.hair, region_attribute=""))
     made = yield from groom_settings.using_as_guides(drawn, surface_object, unparted, scene.present_depsgraph())
     _keep_settings(made, settings)
-    return Applied(made, found.method, places.lost_count, len(groom.counts), groom.left)
+    aside_count = grooming.groom_passage.aside_count(groom.source, target, groom.roots, found)
+    return Applied(made, found.method, places.lost_count, aside_count, len(groom.counts), groom.left)
 
 
 def _painted(surface_object, surface, groom, target, found, depsgraph):

@@ -19,6 +19,7 @@ from hair_addon.blender.settings import asset_libraries
 from hair_addon.core.grooming import groom_passage, groom_transfer
 from hair_addon.core.grooming.groom_transfer import TransferSurface
 from hair_addon.core.long_work import run_now
+from tests.support.meshes import octahedron
 from tests.support.pairs import share_of
 
 FILES = sorted(asset_libraries.SHIPPED.glob("*.blend"))
@@ -67,6 +68,21 @@ def test_guides_have_places_on_other_heads_and_lengths_in_proportion(file, build
 
 def _is_fur(file):
     return "Fur" in file.name
+
+
+def test_a_mesh_of_another_shape_gets_a_note(hair):
+    """Guides of a ball are far from their places on an octahedron in the same box."""
+    faces, mesh = octahedron(), bpy.data.meshes.new("Octahedron")
+    mesh.from_pydata(faces.vertices.tolist(), [], faces.triangles.tolist())
+    surface = bpy.data.objects.new("Octahedron", mesh)
+    bpy.context.scene.collection.objects.link(surface)
+    bpy.context.view_layer.update()
+    depsgraph = scene.present_depsgraph()
+    groom = library_groom.take(hair.data, "Groom", depsgraph)
+    applied = run_now(library_groom.adding_groom(surface, groom, depsgraph))
+    far = "{count} of {all} guides are far from their places, as this mesh has another shape."
+    assert far in dict(applied.notes())
+    assert far not in dict(replace(applied, aside_count=applied.guide_count // 5).notes())
 
 
 @pytest.mark.long
