@@ -230,12 +230,12 @@ def _mark_painted(images, depsgraph):
 
 @persistent
 def before_frame_change(_scene, _depsgraph):
-    """Remember setting values, to detect animated changes, and move `after_frame_change` behind handlers of scripts."""
+    """Remember setting values, to detect animated changes, and let `after_other_handlers` run last."""
     animated.remember()
     after = bpy.app.handlers.frame_change_post
-    if after_frame_change in after and after[-1] is not after_frame_change:
-        after.remove(after_frame_change)
-        after.append(after_frame_change)
+    if after_other_handlers in after and after[-1] is not after_other_handlers:
+        after.remove(after_other_handlers)
+        after.append(after_other_handlers)
 
 
 @persistent
@@ -276,6 +276,27 @@ def after_frame_change(scene, depsgraph):
             live_hair.write_all()
 
 
+@persistent
+def after_other_handlers(scene, depsgraph):
+    """Follow guides that handlers of scripts have moved since `after_frame_change`, after which scripts read hair."""
+    if not _have_others() or not scene_time.may_write(scene, depsgraph):
+        return
+    moved = _moved_guides(bpy.data.hair_curves, depsgraph)
+    if moved:
+        is_render = scene_time.is_rendered(depsgraph)
+        evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
+        simulated_hair.note_combed(moved, scene)
+        if is_render:
+            live_hair.write_all()
+
+
+def _have_others():
+    """Whether scripts or other add-ons have handlers of frames."""
+    own = before_frame_change, after_frame_change, after_other_handlers
+    frame_handlers = *bpy.app.handlers.frame_change_pre, *bpy.app.handlers.frame_change_post
+    return any(handler not in own for handler in frame_handlers)
+
+
 def _edited_by_script(reports, deformed):
     """Return the surfaces whose meshes a script edited just before it changed the frame; no other update reports them.
 
@@ -296,8 +317,8 @@ def _follow_script(reports, edited, scene, depsgraph):
 
     Returns {guide Curves that have moved: None}, whose points are read later, as settings of the frame may change them.
     """
-    have_handlers = len(bpy.app.handlers.frame_change_pre) + len(bpy.app.handlers.frame_change_post) > 2
-    if _is_opening or (scene_time.is_shown_moving() and not have_handlers):
+    have_others = _have_others()
+    if _is_opening or (scene_time.is_shown_moving() and not have_others):
         return {}
     if edited:
         separated = _follow_surfaces(edited, {one.data for one in edited}, [], depsgraph)
@@ -306,9 +327,15 @@ def _follow_script(reports, edited, scene, depsgraph):
         if separated:
             copied_faces.follow(separated, scene.view_layers[depsgraph.view_layer.name])
     # Guides that a handler has just moved are not reported yet.
-    reported = bpy.data.hair_curves if have_handlers else updates.originals(reports, is_geometry=True)
-    moved = [one for one in reported if isinstance(one, bpy.types.Curves) and one.vellus.kind == "GUIDES"]
-    return dict.fromkeys(_follow_geometry(moved, depsgraph))
+    return _moved_guides(
+        bpy.data.hair_curves if have_others else updates.originals(reports, is_geometry=True), depsgraph
+    )
+
+
+def _moved_guides(datablocks, depsgraph):
+    """Return {guide Curves among datablocks that have moved: None}."""
+    guides = [one for one in datablocks if isinstance(one, bpy.types.Curves) and one.vellus.kind == "GUIDES"]
+    return dict.fromkeys(_follow_geometry(guides, depsgraph))
 
 
 def _show_hidden():
@@ -433,6 +460,7 @@ _HANDLERS = (
     (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
     (bpy.app.handlers.frame_change_pre, before_frame_change),
     (bpy.app.handlers.frame_change_post, after_frame_change),
+    (bpy.app.handlers.frame_change_post, after_other_handlers),
     (bpy.app.handlers.animation_playback_post, after_playing),
     (bpy.app.handlers.save_pre, before_reading),
     (bpy.app.handlers.save_pre, before_saving),

@@ -203,6 +203,31 @@ def test_hair_follows_guides_that_a_handler_of_a_script_moves_in_each_frame(hair
         handlers.remove(shorten)
 
 
+def test_handlers_of_scripts_read_the_hair_of_the_frame(hair):
+    """A handler that an exporter appends to `frame_change_post` reads hair of keyed guides of the same frame."""
+    settings, scene, found = bpy.data.objects["Guides"].data.vellus.guides, bpy.context.scene, {}
+    for frame in (1, 9):
+        settings.length = 0.1 * frame
+        settings.keyframe_insert("length", frame=frame)
+
+    def mean_length():
+        return float(np.linalg.norm(np.diff(points(hair), axis=1), axis=-1).sum(axis=1).mean())
+
+    def read(scene, _depsgraph):
+        found[scene.frame_current] = mean_length()
+
+    bpy.app.handlers.frame_change_post.append(read)
+    try:
+        for frame in (2, 5, 8):
+            scene.frame_set(frame)
+    finally:
+        bpy.app.handlers.frame_change_post.remove(read)
+    for frame, length in found.items():
+        scene.frame_set(frame)
+        assert length == pytest.approx(mean_length(), rel=1e-6)
+    assert found[8] > 1.5 * found[2]
+
+
 def test_nothing_is_made_again_while_live_is_off(hair):
     hair.data.vellus.is_live = False
     hair.data.vellus.hair.strand_count = 200
