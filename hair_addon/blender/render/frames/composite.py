@@ -32,6 +32,7 @@ _OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # render sett
 refused_cache = Cache()  # session_uid of a hair scene → errors in the current or last render
 
 _COMPOSITED = "vellus_use_compositing"  # custom property of the hair scene: the former `use_compositing`
+_REPAIR_DELAY = 0.2  # [s] between attempts while a render runs
 
 
 def is_on(blender_scene):
@@ -143,8 +144,11 @@ def needs_repair(blender_scene):
 def repair():
     """Give copies of scenes their own hair scene, and turn compositing off if the hair scene was deleted.
 
-    Must not be called during a depsgraph update or a render, as it creates and removes datablocks.
+    Must not be called during a depsgraph update, as it creates and removes datablocks. As a timer it waits for the end
+    of a render, whose thread reads the nodes: returns the time [s] to the next call, None once it is done.
     """
+    if running.is_rendering():
+        return _REPAIR_DELAY
     for blender_scene in list(bpy.data.scenes):
         if needs_repair(blender_scene):
             hair_scene = blender_scene.vellus.hair_scene
@@ -156,6 +160,7 @@ def repair():
             else:
                 _separate(blender_scene)
                 follow(blender_scene)
+    return None
 
 
 def refuse(hair_scene, sentence):

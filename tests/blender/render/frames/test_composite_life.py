@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import hair_addon
+from hair_addon.blender.host import running
 from hair_addon.blender.live import handlers, refused_hair
+from hair_addon.blender.render.frames import composite
 from hair_addon.blender.ui import menus
 from tests.support.interface.layout import draw
 from tests.support.pictures.rendering import configure
@@ -53,6 +55,18 @@ def test_a_scene_with_copied_settings_alone_leaves_the_hair_s_scene_to_the_other
     empty = copied("EMPTY")
     assert empty.vellus.hair_scene is None
     assert scene.vellus.hair_scene.frame_start == scene.frame_start
+
+
+def test_it_is_turned_off_after_the_render_that_runs(composited, monkeypatch):
+    """The thread of a render reads the nodes, so they are removed after its end."""
+    scene = bpy.context.scene
+    bpy.data.scenes.remove(scene.vellus.hair_scene)
+    with monkeypatch.context() as patch:
+        patch.setattr(running, "is_rendering", lambda: True)
+        assert composite.repair() > 0.0
+    assert node_of(scene)
+    assert composite.repair() is None
+    assert scene.compositing_node_group is None and composited.visible_camera
 
 
 def test_deleting_the_hair_s_scene_turns_it_off(composited):
