@@ -265,11 +265,7 @@ def after_frame_change(scene, depsgraph):
             not is_render and not scene_time.is_shown_moving() and any(map(_is_outdated, bpy.data.hair_curves))
         )
         if animated.follow(depsgraph) or have_ramps_changed or moved or is_outdated:
-            # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-            evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
-            simulated_hair.note_combed(combed, scene)
-            if is_render:
-                live_hair.write_all()
+            _evaluate_in_frame(moved, combed, scene, depsgraph)
     finally:
         simulated_hair.follow_frame(scene, depsgraph)
         if is_render:
@@ -283,11 +279,17 @@ def after_other_handlers(scene, depsgraph):
         return
     moved = _moved_guides(bpy.data.hair_curves, depsgraph)
     if moved:
-        is_render = scene_time.is_rendered(depsgraph)
-        evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
-        simulated_hair.note_combed(moved, scene)
-        if is_render:
-            live_hair.write_all()
+        _evaluate_in_frame(moved, moved, scene, depsgraph)
+
+
+def _evaluate_in_frame(moved, combed, scene, depsgraph):
+    """Evaluate outdated hair, and hair of moved guides; combed: those of them that a script has moved."""
+    is_render = scene_time.is_rendered(depsgraph)
+    # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
+    evaluation.evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, moved)
+    simulated_hair.note_combed(combed, scene)
+    if is_render:
+        live_hair.write_all()
 
 
 def _have_others():
