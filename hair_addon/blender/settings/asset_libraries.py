@@ -16,21 +16,25 @@ _KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4),
 
 
 def library_name(name, description):
-    """Return a property for the name of an asset library, with search."""
+    """Return a property for the name of an asset library that grooms can be saved to, with search."""
     return bpy.props.StringProperty(
         name=name, description=description, translation_context=CONTEXT, search=_names, search_options=set()
     )
 
 
 def _names(_owner, _context, typed):
+    return [name for name in _names_to_save() if typed.casefold() in name.casefold()]
+
+
+def _names_to_save():
+    """Return the names of the asset libraries that grooms can be saved to."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
-    return [library.name for library in libraries if typed.casefold() in library.name.casefold()]
+    return [library.name for library in libraries if not _is_shipped(library)]
 
 
 def first_name():
     """Return the name of the first asset library that grooms can be saved to, empty if there is none."""
-    libraries = bpy.context.preferences.filepaths.asset_libraries
-    return next((library.name for library in libraries if not _is_shipped(library)), "")
+    return next(iter(_names_to_save()), "")
 
 
 def _is_shipped(library):

@@ -158,7 +158,7 @@ def test_a_window_shows_sizes_before_strands_are_written(mask_first, monkeypatch
 
 def test_a_group_that_is_named_like_hair_is_picked(sphere):
     """A group named after hair is picked before hair is made and in the panel, unless it is a bone's, empty or used
-    by hair.
+    by hair. An artist's choice is for one hair system.
     """
     sphere.vertex_groups["top"].name = "Kopfhaar"
     for name, vertices in (("scalp", []), ("hair", range(40)), ("beard", range(40))):
@@ -184,6 +184,9 @@ def test_a_group_that_is_named_like_hair_is_picked(sphere):
     new.mask = "hair"
     assert new.mask == _asked().density_group == "hair"
     assert guides_of(hair).vellus.guides.density_group == "Kopfhaar"
+    add(**COUNTS, density_group="hair")
+    bpy.context.view_layer.objects.active = sphere
+    assert new.mask == _asked().density_group == "beard"  # the next system does not grow in the same group
 
 
 def _asked():

@@ -11,7 +11,7 @@ from hair_addon.blender.data.strands import curves, gathered_groups
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
-from tests.support.reading import evaluated_points, points
+from tests.support.reading import evaluated_points, points, write_points
 
 SIZES = {"tie_radius": 0.05, "tail_radius": 0.08, "bun_radius": 0.2, "pitch": 0.3, "clearance": 0.02}
 LINE = ((0.0, 0.6, 0.8), (0.0, 0.9, 1.1), (0.0, 1.3, 0.6), (0.0, 1.3, -1.0))
@@ -118,6 +118,52 @@ def test_ties_stay_where_they_are_if_guides_are_cut(guides):
     api.change_guides(guides, "LENGTH", method="SCALE", factor=1.5)  # scaled guides keep their fractions
     np.testing.assert_allclose(gathered_groups.read(guides.data).held, held, rtol=1e-5)
     np.testing.assert_array_equal(gathered_groups.tie_fractions_of(guides.data), tie_fractions)
+
+
+def tie_lengths(guides):
+    """Return the lengths (G,) from roots to ties."""
+    along = np.pad(segments(points(guides)).cumsum(axis=1), ((0, 0), (1, 0)))
+    numbers, fractions = np.arange(along.shape[1]), gathered_groups.tie_fractions_of(guides.data)
+    return np.array([np.interp(tie * numbers[-1], numbers, own) for tie, own in zip(fractions, along, strict=True)])
+
+
+def resampled(shape, length):
+    """Return a guide (P, 3) cut or extended at its tip to a length as Grow / Shrink Curves does: all points move."""
+    along = np.insert(segments(shape[None])[0].cumsum(), 0, 0.0)
+    ahead = (shape[-1] - shape[-2]) / np.linalg.norm(shape[-1] - shape[-2])
+    line, along = np.vstack([shape, shape[-1] + 10.0 * ahead]), np.append(along, along[-1] + 10.0)
+    places = along[:-1] * length / along[-2]
+    return np.stack([np.interp(places, along, axis) for axis in line.T], axis=1)
+
+
+@pytest.mark.parametrize("is_scaled", [False, True])
+def test_ties_stay_where_they_are_if_brushes_change_lengths(guides, is_scaled):
+    """Brushes cut and extend guides at their tips, or scale them about their roots, by a little in each event."""
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    gather(guides, shape="BRAID")
+    before, held = tie_lengths(guides), gathered_groups.read(guides.data).held * segments(points(guides)).sum(axis=1)
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    bpy.context.view_layer.update()
+    for factor in (0.9, 0.8, 0.9, 1.05):
+        own = points(guides)
+        root, lengths = own[:, :1], factor * segments(own).sum(axis=1)
+        write_points(
+            guides,
+            root + factor * (own - root)
+            if is_scaled
+            else np.stack([resampled(line, length) for line, length in zip(own, lengths, strict=True)]),
+        )
+        bpy.context.view_layer.update()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    scale = 0.9 * 0.8 * 0.9 * 1.05 if is_scaled else 1.0
+    np.testing.assert_allclose(tie_lengths(guides), scale * before, rtol=0.02)
+    now = gathered_groups.read(guides.data).held * segments(points(guides)).sum(axis=1)
+    is_held = gathered_groups.read(guides.data).held < 1.0
+    np.testing.assert_allclose(now[is_held], scale * held[is_held], rtol=0.02)
+    anew = pipeline.bind_hair(*pipeline.inputs_of(bpy.data.objects["Hair"].data), bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_allclose(points(bpy.data.objects["Hair"]), anew.points, atol=1e-5)
 
 
 def test_ties_of_guides_with_fewer_points_than_strands(guides):

@@ -16,6 +16,7 @@ NAME = "gathered"
 HELD = "gathered_held"
 TIE = "gathered_tie"
 _LENGTH = "gathered_length"  # up to the tie, in local units
+_LEAST_CHANGE = 1e-4  # of a guide's length; smaller changes in one event are of strokes that preserve lengths
 _FLOAT_PER_GUIDE = "FLOAT", "CURVE"
 _TYPES = ((NAME, "INT"), (HELD, "FLOAT"), (TIE, "FLOAT"), (_LENGTH, "FLOAT"))
 
@@ -108,23 +109,81 @@ def follow_lengths(datablock, before, cuts):
     before: (N, 3), their local points before the change; cuts: whether shorter guides are cut instead of scaled. Points
     keep their fractions of a guide's length, so after a cut a greater part of them is up to the tie.
     """
+    _follow(datablock, before, lambda former, present: (_along(present)[:, -1] < _along(former)[:, -1]) & cuts)
+
+
+def follow_stroke(datablock, before):
+    """Update ties as `follow_lengths` after a brush that may have cut, extended or scaled guides; returns whether any
+    guide has another tie or length up to it.
+
+    before: (N, 3), their local points before the stroke's last event.
+    """
+    if groups_of(datablock) is None or len(before) != len(datablock.points):
+        return False
+    return _follow(datablock, before, _is_extended_or_cut, _LEAST_CHANGE)
+
+
+def _is_extended_or_cut(former, present):
+    """Return (G,) bool: guides whose shorter points, former or present (G, P, 3), lie on the longer ones, rather than
+    being the other ones scaled about the root.
+    """
+    before, now = _along(former), _along(present)
+    is_cut = (now[:, -1] < before[:, -1])[:, None]
+    longer, shorter = (np.where(is_cut[..., None], *pair) for pair in ((former, present), (present, former)))
+    along, places = (np.where(is_cut, *pair) for pair in ((before, now), (now, before)))
+    cut = _at_numbers(longer, _numbers_at(along, places))
+    scales = now[:, -1] / np.maximum(before[:, -1], 1e-30)
+    scaled = former[:, :1] + scales[:, None, None] * (former - former[:, :1])
+    return np.linalg.norm(shorter - cut, axis=2).max(axis=1) < np.linalg.norm(present - scaled, axis=2).max(axis=1)
+
+
+def _numbers_at(along, places):
+    """Return the fractional numbers (G, K) of the points of guides, at lengths (G, K); along: as from `_along`."""
+    whole, guides = np.maximum(along[:, -1:], 1e-30), 2.0 * np.arange(len(along))[:, None]
+    numbers = np.arange(along.size).reshape(along.shape)
+    found = np.interp(
+        (guides + np.clip(places / whole, 0.0, 1.0)).ravel(), (guides + along / whole).ravel(), numbers.ravel()
+    )
+    return found.reshape(places.shape) - numbers[:, :1]
+
+
+def _at_numbers(points, numbers):
+    """Return the places (G, K, 3) on guides (G, P, 3) at fractional numbers (G, K) of their points."""
+    first = np.minimum(numbers.astype(int), points.shape[1] - 2)
+    rows, part = np.arange(len(points))[:, None], (numbers - first)[..., None]
+    return (1.0 - part) * points[rows, first] + part * points[rows, first + 1]
+
+
+def _follow(datablock, before, is_cut_of, least_change=0.0):
+    """Update ties as `follow_lengths`; returns whether any has changed.
+
+    is_cut_of: (points before, points now), each (G, P, 3) → (G,) bool: guides that are cut or extended at their tips;
+    least_change: of a guide's length.
+    """
     groups, tie_fractions, lengths = (
         groups_of(datablock),
         tie_fractions_of(datablock),
         attributes.read(datablock, _LENGTH, *_FLOAT_PER_GUIDE),
     )
     if groups is None:
-        return
-    former, present = (_along(_even(datablock, points)) for points in (before, curves.read_points(datablock)))
+        return False
+    shapes = [_even(datablock, points) for points in (before, curves.read_points(datablock))]
+    former, present = map(_along, shapes)
     whole = former[:, -1]
-    is_cut = (present[:, -1] < whole) if cuts else np.zeros(len(groups), bool)
+    if (np.abs(present[:, -1] - whole) <= least_change * whole).all():
+        return False
+    is_cut = is_cut_of(*shapes)
     if tie_fractions is not None:
-        for guide in np.flatnonzero((tie_fractions > 0.0) & is_cut):
-            tie_fractions[guide] = _part_at(present[guide], _length_at(former[guide], tie_fractions[guide]))
+        is_moved = (tie_fractions > 0.0) & is_cut
+        last = former.shape[1] - 1
+        places = _at_numbers(former[..., None], last * tie_fractions[:, None])[..., 0]
+        parts = np.where(places < present[:, -1:], _numbers_at(present, places) / last, 1.0)
+        tie_fractions = np.where(is_moved, parts[:, 0], tie_fractions).astype(np.float32)
         attributes.write(datablock, TIE, *_FLOAT_PER_GUIDE, tie_fractions)
     if lengths is not None:
         scales = np.where(is_cut | (whole <= 0.0), 1.0, present[:, -1] / np.maximum(whole, 1e-30))
         attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, lengths * scales)
+    return True
 
 
 def of_even_points(datablock, tie_fractions):

@@ -35,3 +35,9 @@ def filled(surface: Object) -> str:
     """Return `mask_of` a mesh object if the group has any weights, else an empty name."""
     name = mask_of(surface)
     return name if name and has_weights(surface, name) else ""
+
+
+def forget_choice(surface: Object) -> None:
+    """Suggest a mask again after new hair has grown in the chosen group."""
+    if surface.vellus.has_new_hair_mask and surface.is_editable:
+        surface.vellus.new_hair_mask, surface.vellus.has_new_hair_mask = "", False

@@ -82,6 +82,7 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         guides, hair = made
         setting_properties.show(self, guides.vellus.guides, GuideSettings)
         setting_properties.show(self, hair.vellus.hair, HairSettings)
+        mask_suggestions.forget_choice(guides.surface)
         context.view_layer.update()  # to evaluate the new objects
         hair_object = object_of(hair, context.view_layer)
         name_guides(hair_object)

@@ -120,6 +120,7 @@ def test_a_button_adds_the_library_once_and_nothing_is_saved_to_it(sphere):
         assert list(libraries.keys()) == [*before, "Vellus"]
         assert asset_libraries.folder_of("Vellus") == asset_libraries.SHIPPED
         assert asset_libraries.first_name() == "".join(before[:1])
+        assert asset_libraries._names(None, None, "") == before  # what the field of Save Groom to Library lists
         settings = api.GroomSettings(api.GuideSettings(guide_count=5), api.HairSettings(strand_count=5))
         _guides, hair = api.add_hair(sphere, settings)
         bpy.context.view_layer.objects.active = bpy.data.objects[hair.name]
