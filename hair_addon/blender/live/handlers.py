@@ -276,9 +276,17 @@ def after_frame_change(scene, depsgraph):
 
 @persistent
 def after_other_handlers(scene, depsgraph):
-    """Follow guides that handlers of scripts have moved since `after_frame_change`, after which scripts read hair."""
+    """Follow meshes and guides that handlers of scripts have edited since `after_frame_change`, after which scripts
+    read hair.
+    """
     if not _have_others() or not scene_time.may_write(scene, depsgraph):
         return
+    if (
+        _have_others(bpy.app.handlers.frame_change_post)
+        and _follow_edited_meshes()
+        and scene_time.is_rendered(depsgraph)
+    ):
+        live_hair.write_all()
     moved = _moved_guides(bpy.data.hair_curves, depsgraph)
     if moved:
         _evaluate_in_frame(moved, moved, scene, depsgraph)
@@ -294,22 +302,39 @@ def _evaluate_in_frame(moved, combed, scene, depsgraph):
         live_hair.write_all()
 
 
-def _have_others():
-    """Whether scripts or other add-ons have handlers of frames."""
+def _follow_edited_meshes():
+    """Follow meshes of surfaces that handlers of scripts have edited in this frame; returns whether there are any.
+
+    Evaluating them reports them to `after_depsgraph_update`.
+    """
+    meshes = {one.data for one in _surfaces() if one.type == "MESH" and one.mode == "OBJECT"}
+    are_moved = [*map(last_update.has_mesh_moved, meshes)]
+    if any(are_moved):
+        bpy.context.evaluated_depsgraph_get()
+    return any(are_moved)
+
+
+def _have_others(frame_handlers=None):
+    """Whether scripts or other add-ons have handlers of frames; frame_handlers: one of Blender's two lists, or both."""
     own = before_frame_change, after_frame_change, after_other_handlers
-    frame_handlers = *bpy.app.handlers.frame_change_pre, *bpy.app.handlers.frame_change_post
-    return any(handler not in own for handler in frame_handlers)
+    both = *bpy.app.handlers.frame_change_pre, *bpy.app.handlers.frame_change_post
+    return any(handler not in own for handler in (both if frame_handlers is None else frame_handlers))
 
 
 def _edited_by_script(reports, deformed):
-    """Return the surfaces whose meshes a script edited just before it changed the frame; no other update reports them.
+    """Return the surfaces whose meshes a script edited just before it changed the frame, or in a handler before that;
+    no other update reports them.
 
-    Playback begins after an update. Animated meshes are left out, as they are reported in each frame, edited or not.
+    Animated meshes are reported in each frame, edited or not. Playback without such handlers begins after an update.
     """
-    if scene_time.is_shown_moving():
+    is_moving = scene_time.is_shown_moving()
+    if is_moving and not _have_others(bpy.app.handlers.frame_change_pre):
         return set()
     meshes = {mesh for mesh in updates.originals(reports, is_geometry=True) if isinstance(mesh, bpy.types.Mesh)}
-    return {one for one in deformed & _surfaces() if one.data in meshes and not _is_animated(one.data)}
+    reported = [one for one in deformed & _surfaces() if one.data in meshes]
+    doubtful = {one.data for one in reported if is_moving or _is_animated(one.data)}
+    unchanged = {mesh for mesh in doubtful if not last_update.has_mesh_moved(mesh)}
+    return {one for one in reported if one.data not in unchanged}
 
 
 def _is_animated(mesh):

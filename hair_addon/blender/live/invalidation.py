@@ -72,6 +72,7 @@ COPIES = (
     simulated_hair.waiting_cache,
     last_update.guide_cache,
     last_update.former_cache,
+    last_update.mesh_cache,
     last_update.painting_cache,
     last_update.place_cache,
     hidden_hair.paused_cache,

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ..data import surface_space
+from ..data import scene, surface_space
 from ..data.strands import curves
 from ..host.caches import Cache
 
@@ -14,6 +14,9 @@ guide_cache = Cache()
 
 # session_uid of guide Curves → their (N, 3) points before they moved the last time.
 former_cache = Cache()
+
+# session_uid of a mesh → its (V, 3) positions at rest, kept for meshes that scripts may edit while frames change.
+mesh_cache = Cache()
 
 # session_uid of a surface in Texture Paint mode → True. Blender may not report painting before that mode ends.
 painting_cache = Cache()
@@ -46,6 +49,14 @@ def former_points_of(guide_curves):
 def points_of(guide_curves):
     """Return (N, 3) local points of guides, as last read by `have_guides_moved`."""
     return guide_cache.get(guide_curves.session_uid)
+
+
+def has_mesh_moved(mesh):
+    """Whether the positions of a mesh at rest have changed since the last call for it; True the first time."""
+    positions = scene.vertex_positions(mesh)
+    before = mesh_cache.get(mesh.session_uid)
+    mesh_cache.keep(mesh.session_uid, positions)
+    return before is None or not np.array_equal(before, positions)
 
 
 def remember_places():

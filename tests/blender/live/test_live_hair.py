@@ -228,6 +228,53 @@ def test_handlers_of_scripts_read_the_hair_of_the_frame(hair):
     assert found[8] > 1.5 * found[2]
 
 
+def _stretched(depsgraph):
+    """Return the evaluated height of a sphere whose Z is scaled, and the largest distance of roots from it."""
+    vertices = render_probe.read_mesh(depsgraph.objects["Sphere"].data).vertices
+    roots = render_probe.read_points(depsgraph.objects["Hair"].data)[:, 0]
+    height = vertices[:, 2].max()
+    return height, np.abs(np.linalg.norm(roots / np.float32([1.0, 1.0, height]), axis=1) - 1.0).max()
+
+
+@pytest.mark.parametrize("when", ["frame_change_pre", "frame_change_post"])
+def test_hair_stays_on_a_mesh_that_a_handler_of_a_script_edits_in_each_frame(hair, when):
+    mesh, rest = bpy.data.objects["Sphere"].data, vertex_positions(bpy.data.objects["Sphere"])
+
+    def stretch(scene, _depsgraph):
+        moved = rest * np.float32([1.0, 1.0, 1.0 + 0.2 * scene.frame_current])
+        mesh.vertices.foreach_set("co", moved.ravel())
+        mesh.update()
+
+    handlers = getattr(bpy.app.handlers, when)
+    handlers.append(stretch)
+    try:
+        with render_probe.reading(_stretched) as render:
+            heights, apart = zip(*render(frames=(2, 6, 2)), strict=True)
+        np.testing.assert_allclose(heights, [1.4, 1.8, 2.2], atol=0.01)
+        assert max(apart) < 0.01
+        bpy.context.scene.frame_set(9)
+        height, apart = _stretched(bpy.context.evaluated_depsgraph_get())
+        assert height == pytest.approx(2.8, abs=0.01) and apart < 0.01
+    finally:
+        handlers.remove(stretch)
+
+
+def test_hair_follows_a_script_that_edits_a_mesh_with_keyed_shape_keys_before_it_changes_the_frame(hair):
+    sphere = bpy.data.objects["Sphere"]
+    basis, key = (sphere.shape_key_add(name=name) for name in ("Basis", "Smile"))
+    for frame in (1, 100):
+        key.value = frame / 100.0
+        key.keyframe_insert("value", frame=frame)
+    bpy.context.scene.frame_set(2)
+    rest = vertex_positions(sphere)
+    for edited in (basis.data, key.data, sphere.data.vertices):
+        edited.foreach_set("co", (rest * np.float32([1.0, 1.0, 2.0])).ravel())
+    sphere.data.update()
+    bpy.context.scene.frame_set(3)
+    height, apart = _stretched(bpy.context.evaluated_depsgraph_get())
+    assert height == pytest.approx(2.0, abs=0.01) and apart < 0.01
+
+
 def test_nothing_is_made_again_while_live_is_off(hair):
     hair.data.vellus.is_live = False
     hair.data.vellus.hair.strand_count = 200
