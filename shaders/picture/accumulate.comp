@@ -15,17 +15,28 @@ float depth_of(ivec2 sample_place, float alpha)
   return depth - SHADOW_BIAS * (1.0 - depth);
 }
 
-// Adds the samples of a pixel, with a weight, to their total; `nearest` becomes their least depth.
-void add_pixel(ivec2 corner, float part, inout vec4 total, inout float nearest)
+// Depth of a sample, 1 without hair or its shadow.
+float seen_depth(ivec2 sample_place, float alpha)
 {
-  for (int y = 0; y < samples_per_side; y++) {
-    for (int x = 0; x < samples_per_side; x++) {
-      vec4 hair = texelFetch(picture, corner + ivec2(x, y), 0);
-      total += part * hair;
-      if (hair.a > 0.0) {
-        nearest = min(nearest, depth_of(corner + ivec2(x, y), hair.a));
-      }
-    }
+  return (alpha > 0.0) ? depth_of(sample_place, alpha) : 1.0;
+}
+
+// Adds the samples around a sample, for passes with one sample per pixel, to the total of its pixel.
+void share(ivec2 place, ivec2 last, inout vec4 total, inout float nearest)
+{
+  float own = 1.0 - 2.0 * spread;
+  total *= own * own;
+  for (int turn = 0; turn < 9; turn++) {
+    ivec2 offset = ivec2(turn % 3 - 1, turn / 3 - 1);
+    float part = ((offset.x == 0) ? own : spread) * ((offset.y == 0) ? own : spread);
+    part = (turn == 4) ? 0.0 : part;
+    total += part * texelFetch(picture, clamp(place + offset, ivec2(0), last), 0);
+  }
+  // A loop without turns costs software drivers nothing, unlike a branch.
+  int turns = (nearest == 1.0 && total.a > 0.0) ? 9 : 0;
+  for (int turn = 0; turn < turns; turn++) {
+    ivec2 beside = clamp(place + ivec2(turn % 3 - 1, turn / 3 - 1), ivec2(0), last);
+    nearest = min(nearest, seen_depth(beside, texelFetch(picture, beside, 0).a));
   }
 }
 
@@ -40,18 +51,15 @@ void main()
   vec4 total = vec4(0.0);
   float nearest = 1.0;
   if (all(greaterThanEqual(corner, ivec2(0))) && all(lessThanEqual(corner, last))) {
-    float own = 1.0 - 2.0 * spread;
-    add_pixel(corner, own * own, total, nearest);
-    if (spread > 0.0) {
-      float beside = 1.0;
-      for (int turn = 0; turn < 9; turn++) {
-        ivec2 offset = ivec2(turn % 3 - 1, turn / 3 - 1);
-        if (offset != ivec2(0)) {
-          float part = ((offset.x == 0) ? own : spread) * ((offset.y == 0) ? own : spread);
-          add_pixel(clamp(corner + offset * samples_per_side, ivec2(0), last), part, total, beside);
-        }
+    for (int y = 0; y < samples_per_side; y++) {
+      for (int x = 0; x < samples_per_side; x++) {
+        vec4 hair = texelFetch(picture, corner + ivec2(x, y), 0);
+        total += hair;
+        nearest = min(nearest, seen_depth(corner + ivec2(x, y), hair.a));
       }
-      nearest = (nearest < 1.0) ? nearest : beside;
+    }
+    if (spread > 0.0) {
+      share(corner, last, total, nearest);
     }
   }
   total /= float(samples_per_side * samples_per_side);
