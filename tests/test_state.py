@@ -7,7 +7,7 @@ from tests.test_conventions import MODULES, name_of, no_garbage_collection, node
 
 # State that is no cache → the event that resets it.
 STATE = {
-    "blender/data/scene.py: _faces_read": "the end of reading a viewport's scene, a context",
+    "blender/data/scene.py: _read_once": "the end of reading a viewport's scene, a context",
     "blender/data/whole_changes.py: _open": "the end of each step of a change, a context",
     "blender/groom/guides/brushes.py: _fitted": "nobody: Blender's brushes and what was set in them outlive a file",
     "blender/groom/dynamics/guide_baking.py: _baking": "the end of baking, on every way out",

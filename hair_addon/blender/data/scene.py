@@ -24,7 +24,7 @@ _MOST_CORNERS = 100_000  # of a face: the time to triangulate a face grows faste
 # session_uid of a mesh object → last read (`Faces`, (C,) edges of its corners).
 faces_cache = Cache(capacity=64)
 
-_faces_read = None  # {(session_uid, counts) of a mesh: `Faces`} in `faces_read_once`
+_read_once = None  # {(function, session_uid, counts of a mesh): its result} in `meshes_read_once`
 
 _OF_CORNERS = {".corner_vert": "vertex_index", ".corner_edge": "edge_index"}  # attributes: properties of `mesh.loops`
 
@@ -51,7 +51,7 @@ def read_surface(surface_object, depsgraph):
     evaluated, known = surface_object.evaluated_get(depsgraph), surface_cache.get(surface_object.session_uid)
     mesh = evaluated.to_mesh()
     try:
-        posed = vertex_positions(mesh)
+        posed = cached_positions(surface_object, mesh)
         rest = _rest_positions(mesh, posed)
         faces = cached_faces(surface_object, mesh)
         uv_map, loop_uvs = _loop_uvs(mesh)
@@ -165,14 +165,38 @@ def faces_of(mesh):
 
 
 @contextmanager
-def faces_read_once():
-    """Context for reading a single evaluation of a dependency graph: `cached_faces` reads each mesh only once."""
-    global _faces_read
-    before, _faces_read = _faces_read, {}
+def meshes_read_once():
+    """Context for reading a single evaluation of a dependency graph: `cached_faces` and `cached_positions` read each
+    mesh only once.
+    """
+    global _read_once
+    before, _read_once = _read_once, {}
     try:
         yield
     finally:
-        _faces_read = before
+        _read_once = before
+
+
+def _once(function, mesh_object, mesh, is_own):
+    """Return function(session_uid, mesh); in `meshes_read_once` the first result for the mesh of an object."""
+    uid = mesh_object.session_uid
+    if _read_once is None or not is_own:
+        return function(uid, mesh)
+    key = function, uid, len(mesh.vertices), len(mesh.loops), len(mesh.polygons)
+    if key not in _read_once:
+        _read_once[key] = function(uid, mesh)
+    return _read_once[key]
+
+
+def cached_positions(mesh_object, mesh, is_own=True):
+    """`vertex_positions` of the evaluated mesh of an object, which must not be changed; is_own: as in
+    `cached_faces`.
+    """
+    return _once(_positions_of, mesh_object, mesh, is_own)
+
+
+def _positions_of(_uid, mesh):
+    return vertex_positions(mesh)
 
 
 def cached_faces(mesh_object, mesh, is_own=True):
@@ -182,12 +206,7 @@ def cached_faces(mesh_object, mesh, is_own=True):
     the slowest part. With the same vertices and edges at corners and the same number of polygons, the polygons are the
     same: the last edge of each leads back to its first vertex.
     """
-    if _faces_read is None or not is_own:
-        return _known_faces(mesh_object.session_uid, mesh)
-    key = mesh_object.session_uid, len(mesh.vertices), len(mesh.loops), len(mesh.polygons)
-    if key not in _faces_read:
-        _faces_read[key] = _known_faces(mesh_object.session_uid, mesh)
-    return _faces_read[key]
+    return _once(_known_faces, mesh_object, mesh, is_own)
 
 
 def _known_faces(uid, mesh):

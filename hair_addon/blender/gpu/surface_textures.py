@@ -24,6 +24,7 @@ _ROW_CORNERS = TEXTURE_WIDTH - 1  # maximum per row
 _ROW_TRANSFORMS = 250  # transforms in a row of their texture
 
 surface_cache = Cache(capacity=64)  # session_uid of a mesh object → its last drawn `SurfaceOnGPU`
+posed_cache = Cache(capacity=16)  # session_uid of a mesh object → the last (vertices, texture) of `posed_places`
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +135,41 @@ class SurfaceOnGPU:
         return record
 
 
+def posed_places(uid, vertices):
+    """Return the texture of the (V, 3) float32 vertices of a mesh object, which must not change later.
+
+    All hair that follows the object and the drawn mesh share the texture, if they were given the same array.
+    """
+    known = posed_cache.get(uid)
+    if known is None or known[0] is not vertices:
+        known = posed_cache.keep(uid, (vertices, _texture_of(vertices, known)))
+    return known[1]
+
+
+def known_places(uid, vertices):
+    """Return the texture of `posed_places` if it was called last with these vertices; else None."""
+    known = posed_cache.get(uid)
+    return known[1] if known is not None and known[0] is vertices else None
+
+
 def upload_surface(
-    vertices, triangles, normals=None, has_vertex_normals=True, uvs=None, colors=(), to_world=None, known=None
+    vertices,
+    triangles,
+    normals=None,
+    has_vertex_normals=True,
+    uvs=None,
+    colors=(),
+    to_world=None,
+    known=None,
+    places=None,
 ):
     """Return the `SurfaceOnGPU` of vertices (V, 3) float32 and vertex indices (3 F,) of triangles. Raises `HairError`.
 
     normals: unit, (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, in the coordinates of
     vertices; None if only depth is drawn; to_world: (4, 4), None: vertices are in world space; uvs: (3 F, 2) or None;
     colors: (number of corners, linear RGB) of each part, with which it lights hair, black by default; known: the last
-    `SurfaceOnGPU` of the object, or None. Unchanged data is not uploaded again.
+    `SurfaceOnGPU` of the object, or None. Unchanged data is not uploaded again. places: the texture of the vertices if
+    it is known.
     """
     packed = tuple(packed_colors([color for _count, color in colors]).tolist()) if colors else (0.0,)
     counts = [count for count, _color in colors] if colors else [len(triangles)]
@@ -154,7 +181,8 @@ def upload_surface(
     else:
         require_indices("vertices", triangles, len(vertices))
         require_count("corners of materials", sum(counts), len(triangles))
-    places = _texture_of(vertices, known and (known.vertices, known.places))
+    if places is None:
+        places = _texture_of(vertices, known and (known.vertices, known.places))
     if normals is None:
         normals_texture = places
     else:

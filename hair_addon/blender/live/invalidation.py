@@ -134,6 +134,7 @@ OTHERS = (
     surface_shading.texture_cache,
     surface_shading.baked_cache,
     surface_textures.surface_cache,
+    surface_textures.posed_cache,
     notices.printed_cache,
     surface_bakes.bake_cache,
     light_panoramas.picture_cache,

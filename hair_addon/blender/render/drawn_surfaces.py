@@ -90,6 +90,8 @@ def _on_gpu(mesh, twins):
     twin = twins.get(shape)
     if twin is not None and (known is None or known.places is not twin.places):
         known = twin if np.array_equal(mesh.vertices, twin.vertices) else known
+    is_twin = known is not None and known is twin
+    places = None if is_twin else surface_textures.known_places(mesh.owner[0], mesh.vertices)
     surface = surface_textures.upload_surface(
         mesh.vertices,
         mesh.triangles,
@@ -99,6 +101,7 @@ def _on_gpu(mesh, twins):
         mesh.colors,
         mesh.to_world,
         known,
+        places,
     )
     twins.setdefault(shape, surface)
     return cache.keep(key, surface)

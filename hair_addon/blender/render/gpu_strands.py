@@ -6,6 +6,7 @@ hair. All hair can be deformed with its surface on the GPU.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from ...core.errors import HairError
 from ..data.strands import attributes
 from ..data.strands.posed_strands import Pose
-from ..gpu import strand_textures
+from ..gpu import strand_textures, surface_textures
 from ..gpu.programs import shaders
 from ..gpu.strands import device_choice, strand_carrier, strand_maker, style_maker
 from ..groom.bindings import BoundHair
@@ -159,6 +160,7 @@ class StrandGenerator:
         self.carrier = strand_carrier.new_carrier(
             *(rest, drawn.point_count, (vertices, weights), surface.rest, surface.turning(vertices)),
             slides[0] if slides else None,
+            partial(surface_textures.posed_places, cached.rooted_on[0]),
         )
         self._triangles = surface.mesh.triangles
         return True

@@ -2,12 +2,13 @@
 """Strands that the GPU deforms with an animated surface equal those deformed by Warp, without uploads of strands."""
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import posed_strands, stored_roots
-from hair_addon.blender.gpu import ambient_visibility, strand_textures
+from hair_addon.blender.gpu import ambient_visibility, strand_textures, surface_textures
 from hair_addon.blender.gpu.strands import device_choice, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import events, live_hair
@@ -82,8 +83,8 @@ def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
     live_hair.write_all()
     bend(watched.data.surface, 0.5)
     drawn(watched)
-    calls, gathered, gather = counts_of(monkeypatch), [], vertex_turner._gathered
-    monkeypatch.setattr(vertex_turner, "_gathered", lambda *given: gathered.append(1) or gather(*given))
+    calls, sent, texture_of = counts_of(monkeypatch), [], surface_textures._texture_of
+    monkeypatch.setattr(surface_textures, "_texture_of", lambda *given: sent.append(1) or texture_of(*given))
     for count, radius in ((60, 0.02), (0, 0.03)):
         comb(count)
         watched.data.vellus.styles[0].curl.radius = radius
@@ -91,10 +92,10 @@ def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
         shown = drawn(watched)
         assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
         np.testing.assert_allclose(shown, carried(watched, watched.data), rtol=0.0, atol=CLOSE)
-    assert not gathered
+    assert not sent
     bend(watched.data.surface, 0.4)
     np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
-    assert gathered == [1]
+    assert sent == [1]
 
 
 def test_styled_hair_is_carried_too(watched, monkeypatch):
@@ -152,14 +153,50 @@ def test_non_finite_vertices_are_refused_until_they_are_mended(watched, monkeypa
     assert calls["uploads"] == 0
 
 
-def test_systems_on_one_surface_read_its_pose_once(watched, monkeypatch):
-    surface = watched.data.surface
+def two_systems(surface):
+    """Add a second hair system to a surface; returns the hair objects."""
     with bpy.context.temp_override(object=surface, active_object=surface, selected_objects=[surface]):
         bpy.context.view_layer.objects.active = surface
         bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=20, length=0.2, strand_count=70)
     live_hair.write_all()
     systems = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
     assert len(systems) == 2
+    return systems
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (-0.01, 0.02, 0.01)])
+def test_a_pose_is_uploaded_once_for_all_hair_and_the_drawn_surface(watched, monkeypatch, scale):
+    """Played frames upload the vertices of a surface once, for all of its hair, its own drawing and motion vectors."""
+    surface, read_once = watched.data.surface, scene.meshes_read_once
+    surface.scale = scale
+    systems = two_systems(surface)
+    frame = None
+    for amount in (0.2, 0.3):
+        bend(surface, amount)
+        for hair in systems:
+            drawn(hair)
+        frame = read(former=frame)
+    drawn_surface = frame.surfaces[0][0]
+    size, sent, buffer = drawn_surface.places.width * drawn_surface.places.height, [], gpu.types.Buffer
+    monkeypatch.setattr(gpu.types, "Buffer", lambda kind, size, *given: sent.append(size) or buffer(kind, size, *given))
+    monkeypatch.setattr(vertex_turner, "_gathered", None)
+    for amount in (0.4, 0.5):
+        bend(surface, amount)
+        sent.clear()
+        with read_once():
+            before, frame = frame, read(former=frame)
+        assert sent.count(size) == 1
+        places, before_places = (one.places[1][one.surface_owners[0], 0] for one in (frame, before))
+        assert places[0] is surface_textures.posed_cache.get(surface.session_uid)[1] is not before_places[0]
+        for hair in systems:
+            wanted = carried_as_stored(hair)
+            close = CLOSE * max(1.0, np.abs(wanted).max())  # long in local coordinates of a small scale
+            np.testing.assert_allclose(drawn(hair), wanted, rtol=0.0, atol=close)
+
+
+def test_systems_on_one_surface_read_its_pose_once(watched, monkeypatch):
+    surface = watched.data.surface
+    systems = two_systems(surface)
     for amount in (0.3, 0.5):
         bend(surface, amount)
         for hair in systems:

@@ -237,7 +237,7 @@ def _some_parts(mesh, parts):
 def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override, has_uvs, is_own, bake):
     mesh = mesh_object.to_mesh()
     try:
-        vertices = scene.vertex_positions(mesh)
+        vertices = scene.cached_positions(mesh_object.original, mesh, is_own)
         layout = _layout(mesh_object, mesh, is_moving, is_own)
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deforms strands with their surface on the GPU: core/geometry/surface_deform.py as a compute program.
 
-Strands at rest and their roots are uploaded once, or made on the GPU; a pose of the surface only uploads the positions
-of vertices around roots.
+Strands at rest and their roots are uploaded once, or made on the GPU; a pose of the surface only uploads positions of
+vertices, once for all hair on a surface.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -71,19 +72,20 @@ def new_carrier(
     vertices: np.ndarray,
     turning: "VertexRotations",
     slides: np.ndarray | None = None,
+    uploaded: Callable | None = None,
 ) -> StrandCarrier:
     """Return the `StrandCarrier` of S strands.
 
     rest: texture of the strands; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric
     coordinates; vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots; slides: (S, 3)
-    offsets from first points to roots at rest, None if strands begin at their roots. Raises `HairError` if counts or
-    indices do not match, or the driver does not support it.
+    offsets from first points to roots at rest, None if strands begin at their roots; uploaded: as for
+    `vertex_turner.new_turner`. Raises `HairError` if counts or indices do not match, or the driver does not support it.
     """
     corners, barycentric = places
     require_count("barycentric coordinates", len(barycentric), len(corners))
     require_indices("vertices", corners, len(vertices))
     _carry_program()  # first: if it is not supported, nothing is uploaded
-    turner = vertex_turner.new_turner(turning, vertices)
+    turner = vertex_turner.new_turner(turning, vertices, uploaded)
     found = np.searchsorted(turning.vertices, corners)
     require_indices("vertices", found, len(turning.vertices))
     require_count("vertices around roots", np.count_nonzero(turning.vertices[found] == corners), corners.size)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rotations of a surface at its vertices on the GPU: core/geometry/vertex_turns.py as a compute program.
 
-A pose only uploads the positions of vertices around roots, twelve bytes each.
+A pose only uploads the positions of vertices around roots, twelve bytes each, or shares those of the whole surface.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _GROUP_SIZE = 64
 _VERTEX_TEXELS = 3
 _LARGEST_INDEX = 1 << 24  # exact in single precision
+_LEAST_PART = 0.125  # of all vertices: fewer are uploaded alone
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,7 @@ class VertexTurner:
     vertex_count: int  # of the mesh
     turned_count: int
     values: np.ndarray  # (rows, row) float32, a buffer for uploads of positions
+    uploaded: Callable | None  # (V, 3) vertices → texture of their positions; None: the needed vertices are uploaded
     turned_to: list = field(default_factory=list)  # [vertices of `turned`, None at rest]; empty: not computed
 
     @property
@@ -58,7 +61,8 @@ class VertexTurner:
         now, smooth_rest = self.rest, self.rest
         if posed is not None:
             require_count("vertices", len(posed), self.vertex_count)
-            now, smooth_rest = _gathered(posed, self.needed, self.values), self.smooth_rest
+            smooth_rest = self.smooth_rest
+            now = self.uploaded(posed) if self.uploaded else _gathered(posed, self.needed, self.values)
         program = _turn_program()
         program.bind()
         for name in ("rings", "around", "faces"):
@@ -73,15 +77,21 @@ class VertexTurner:
         return self.turned
 
 
-def new_turner(turning: "VertexRotations", rest: np.ndarray) -> VertexTurner:
+def new_turner(turning: "VertexRotations", rest: np.ndarray, uploaded: Callable | None = None) -> VertexTurner:
     """Return the `VertexTurner` of a `VertexRotations`; rest: (V, 3) float32, all vertices at rest.
 
-    `rest` differs from the vertices of the `VertexRotations` for a smooth surface. Raises `HairError` if counts do not
-    match, the mesh is too large for a texture, or the driver does not support it.
+    `rest` differs from the vertices of the `VertexRotations` for a smooth surface. uploaded: a function from (V, 3)
+    vertices to a texture of their positions, three texels each, which is used unless roots need few of the vertices;
+    None: each pose uploads the needed vertices. Raises `HairError` if counts do not match, the mesh is too large for a
+    texture, or the driver does not support it.
     """
     vertex_count = len(turning.rest)
     require_count("vertices", len(rest), vertex_count)
     needed, ring_count = turning.needed, len(turning.around)
+    if len(needed) < _LEAST_PART * vertex_count or vertex_count >= _LARGEST_INDEX:
+        uploaded = None
+    if uploaded is not None:
+        needed = np.arange(vertex_count)
     if max(len(needed), len(turning.corners), ring_count) >= _LARGEST_INDEX or (
         len(turning.vertices) > MOST_GROUPS * _GROUP_SIZE
     ):
@@ -111,6 +121,7 @@ def new_turner(turning: "VertexRotations", rest: np.ndarray) -> VertexTurner:
         vertex_count=vertex_count,
         turned_count=len(turning.vertices),
         values=values,
+        uploaded=uploaded,
     )
 
 

@@ -199,7 +199,7 @@ def drawn_scene_of(context):
             return _lit(view, context, shading.light)
         view.is_playing = is_playing
         depsgraph = context.evaluated_depsgraph_get()
-        with scene.faces_read_once():
+        with scene.meshes_read_once():
             view.drawn = drawn_scene.read(
                 context.scene,
                 context.view_layer,
