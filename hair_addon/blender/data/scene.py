@@ -21,7 +21,7 @@ from .surfaces import cage_of, transformed
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate a face grows faster than its number of corners
 
-# session_uid of a mesh object → last read (`Faces`, (C,) edges of its corners).
+# session_uid of a mesh object → last read (`Faces`, `_partition` of its corners).
 faces_cache = Cache(capacity=64)
 
 _read_once = None  # {(function, session_uid, counts of a mesh): its result} in `meshes_read_once`
@@ -203,23 +203,39 @@ def cached_faces(mesh_object, mesh, is_own=True):
     """`faces_of` the evaluated mesh of an object; the last read `Faces` of the object if they are the same.
 
     is_own: whether the mesh is the object's own, not an instance of Geometry Nodes. Reading the starts of polygons is
-    the slowest part. With the same vertices and edges at corners and the same number of polygons, the polygons are the
-    same: the last edge of each leads back to its first vertex.
+    the slowest part, so that they are compared by `_partition`.
     """
     return _once(_known_faces, mesh_object, mesh, is_own)
 
 
 def _known_faces(uid, mesh):
     vertices = corner_values(mesh, ".corner_vert")
-    edges, known = corner_values(mesh, ".corner_edge"), faces_cache.get(uid)
+    partition, known = _partition(mesh), faces_cache.get(uid)
     if known is not None:
-        faces, known_edges = known
+        faces, known_partition = known
         is_as_long = len(faces.starts) == len(mesh.polygons) + 1
-        if is_as_long and np.array_equal(vertices, faces.corner_vertices) and np.array_equal(edges, known_edges):
+        if (
+            is_as_long
+            and np.array_equal(partition, known_partition)
+            and np.array_equal(vertices, faces.corner_vertices)
+        ):
             return faces
     faces = _faces_of_corners(mesh, vertices)
-    faces_cache.keep(uid, (faces, edges))
+    faces_cache.keep(uid, (faces, partition))
     return faces
+
+
+def _partition(mesh):
+    """Return (N,) int32 that are the same for the same number of polygons only if all starts of polygons are the same.
+
+    The polygon of each triangle, as a polygon of n corners has n - 2 triangles. In Edit Mode the edges at corners, as
+    the last edge of each polygon leads back to its first vertex.
+    """
+    if mesh.is_editmode:
+        return corner_values(mesh, ".corner_edge")
+    polygons = np.empty(len(mesh.loop_triangle_polygons), np.int32)
+    mesh.loop_triangle_polygons.foreach_get("value", polygons)
+    return polygons
 
 
 def corner_values(mesh, name):

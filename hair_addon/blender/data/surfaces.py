@@ -15,6 +15,7 @@ from ...core.kernels.checks import require_indices
 # Cached values that do not depend on posed vertices, and are copied to another pose.
 _AT_REST = (
     "to_local_axes",
+    "has_finite_rest",
     "local_mesh",
     "shape",
     "extent",
@@ -73,7 +74,12 @@ class Surface:
     @cached_property
     def is_deformed(self):
         """Whether shape keys or modifiers deform the mesh."""
-        return not np.array_equal(self.rest, self.posed)
+        return not geometry.fingerprint.are_equal(self.rest, self.posed)
+
+    @cached_property
+    def has_finite_rest(self):
+        """Whether all vertices at rest are finite."""
+        return bool(np.isfinite(self.rest).all())
 
     @cached_property
     def local_mesh(self):

@@ -337,7 +337,7 @@ def _placed(views, casts, steps, is_steady, counted):
     found, indices = {}, list(views)
     for group in strand_batches.groups_of(tuple(map(id, casts[index][0])) for index in indices):
         chosen = [indices[place] for place in group]
-        seen_from = np.stack([views[index] for index in chosen])
+        seen_from = uniforms.stacked([views[index] for index in chosen])
         each = []
         for strands, to_world in _linked(casts[chosen[0]][0]):
             records = _records(strands, seen_from, to_world, steps, is_steady)

@@ -96,10 +96,10 @@ class SurfaceOnGPU:
         """(number of vertices, number of corners)."""
         return self.vertex_count, len(self.corners.vertices)
 
-    @cached_property
-    def fingerprint(self) -> tuple:
-        """A fingerprint of the positions of vertices in the world, for motion vectors."""
-        return self.shape, geometry.fingerprint.fingerprint(self.vertices), self.to_world.tobytes()
+    @property
+    def placed_shape(self) -> "PlacedShape":
+        """The positions of vertices in the world, for motion vectors."""
+        return PlacedShape(self.shape, self.vertices, self.to_world.tobytes())
 
     @property
     def samplers(self) -> dict:
@@ -133,6 +133,26 @@ class SurfaceOnGPU:
         record["row_strands"] = self.row_vertices
         record["has_vertex_normals"] = self.corners.has_vertex_normals
         return record
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedShape:
+    """The positions of a surface's vertices in the world, which can be compared with those of another time."""
+
+    shape: tuple  # as of `SurfaceOnGPU`
+    vertices: np.ndarray
+    to_world: bytes
+
+    def __eq__(self, other):
+        if (self.shape, self.to_world) != (other.shape, other.to_world):
+            return False
+        return self.vertices is other.vertices or _have_same_bits(self.vertices, other.vertices)
+
+
+def _have_same_bits(vectors, others):
+    """Whether two arrays (N, 3) float32 have the same bits, also if they are not numbers."""
+    own, other = (np.ascontiguousarray(one, np.float32).view(np.uint32) for one in (vectors, others))
+    return geometry.fingerprint.are_equal(own, other)
 
 
 def posed_places(uid, vertices):
@@ -210,7 +230,7 @@ def _texture_of(vectors, known):
     """Return a texture of (N, 3) float32 vectors, three texels each; known: (vectors, texture) to reuse if equal, or
     None.
     """
-    if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
+    if known is not None and known[0] is not None and _have_same_bits(vectors, known[0]):
         return known[1]
     row = _row_of(len(vectors))
     row_count = avoid_powers_of_two(-(-len(vectors) // row))

@@ -177,15 +177,21 @@ def read(
     is_draft = is_draft or (former is not None and are_made)
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
-    drawn = replace(_EMPTY, hair=hair, world=world, light=shown.light, is_wire=shown.is_wire, **surroundings)
+    is_shadowed = ()
     if shown.light.kind != viewport_shading.SCENE:
-        drawn = replace(drawn, is_shadowed=tuple(owner[0] in grown_on for owner in drawn.surface_owners))
+        is_shadowed = tuple(owner[0] in grown_on for owner in surroundings["surface_owners"])
     drawn = replace(
-        drawn,
+        _EMPTY,
+        hair=hair,
+        world=world,
+        light=shown.light,
+        is_wire=shown.is_wire,
+        is_shadowed=is_shadowed,
         owners=tuple(place.owner for place in places),
         hair_owners=hair_owners,
         selected=tuple(place.is_selected for place in places),
         instances=instances,
+        **surroundings,
     )
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     # Lights first: only their maps can be drawn without the bounds of strands, which the GPU may still be making.

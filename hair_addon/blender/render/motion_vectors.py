@@ -17,7 +17,7 @@ class Places:
     """Transforms and points of everything drawn at one time.
 
     world_to_clip: (4, 4); hair: {owner: (texture of points, (strands, points), object to world, `Moved` or None)};
-    surfaces: {owner: (texture of vertices, (vertices, corners), fingerprint, object to world)}. Owners are keys of
+    surfaces: {owner: (texture of vertices, (vertices, corners), `PlacedShape`, object to world)}. Owners are keys of
     `_unique`.
     """
 
@@ -181,7 +181,7 @@ def places_of(drawn):
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _unique(drawn.owners), strict=True)
     }
     surfaces = {
-        owner: (surface.places, surface.shape, surface.fingerprint, surface.to_world)
+        owner: (surface.places, surface.shape, surface.placed_shape, surface.to_world)
         for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True)
     }
     return hair, surfaces

@@ -205,7 +205,9 @@ def check_mesh(mesh: TriMesh) -> None:
 
 def require_finite(vertices: np.ndarray) -> None:
     """Raise `HairError` unless vertices (V, 3) are finite."""
-    if not np.isfinite(vertices).all():
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = vertices.sum()  # finite only if all of them are: a third of the time
+    if not np.isfinite(total) and not np.isfinite(vertices).all():
         raise HairError("Some of the surface's vertices have non-finite coordinates: repair the mesh or its modifiers.")
 
 

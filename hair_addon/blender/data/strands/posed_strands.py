@@ -104,7 +104,8 @@ def read_pose(surface_object, depsgraph):
 def pose_of(surface):
     """Return the `Pose` of a `Surface`. Raises `HairError` if it is deformed and has non-finite vertices."""
     if surface.is_deformed:
-        require_finite(surface.rest)
+        if not surface.has_finite_rest:
+            require_finite(surface.rest)
         require_finite(surface.posed)
     return Pose(surface, surface.is_deformed)
 

