@@ -5,5 +5,10 @@
 
 void main()
 {
-  color = moved(place_now, place_before, place_after, motion.size.xy);
+#if defined(HAS_PLACE_AFTER)
+  vec4 after = place_after;
+#else
+  vec4 after = place_now;
+#endif
+  color = moved(place_now, place_before, after, motion.size.xy);
 }

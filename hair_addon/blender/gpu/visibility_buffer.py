@@ -301,6 +301,14 @@ class VisibilityBuffer:
         """Clear and return the framebuffer of surfaces for `part_of_light`, `part_by` and `part`."""
         return drawing.cleared(self._part(texture_format, background)[0], background)
 
+    @contextmanager
+    def seen_surfaces_of_part(self, texture_format):
+        """A context with the cleared framebuffer of `part` and the depth of surfaces that were drawn last."""
+        framebuffer = self._part(texture_format, _NOTHING)[2]
+        with framebuffer.bind():
+            framebuffer.clear(color=_NOTHING)
+            yield
+
     def _part(self, texture_format, background):
         # Each background has its own texture: a software driver sometimes loses the clearing of a texture that compute
         # programs have filled, if nothing is drawn into it.

@@ -108,7 +108,8 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
     """
     with buffer.surfaces_of_part(picture_programs.MOTION_FORMAT):
         if has_surfaces:
-            _draw_surfaces(drawn, motion, view)
+            with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+                _draw_surfaces(drawn, motion, view, has_after=True)
     program, inputs = picture_programs.strand_motion_program(), _of_hair(drawn, motion)
     joined = functools.partial(_joined, inputs, is_nearest=False)
     return buffer.part_by(program, picture_programs.MOTION_FORMAT, inputs, joined)
@@ -125,22 +126,26 @@ def draw_nearest(drawn, motion, buffer, texture, nearest):
 
 def draw_surfaces(drawn, motion, view, buffer):
     """Return a texture of motion vectors [pixels] of surfaces to the previous frame, for the samples of a
-    `VisibilityBuffer`.
+    `VisibilityBuffer` that the surfaces were drawn into. Samples of hair or of the background may have any motion.
+
+    GPUs made for computing have few units for drawing: only fragments that are seen are drawn.
     """
-    with buffer.surfaces_of_part(picture_programs.CARRIED_MOTION_FORMAT):
-        _draw_surfaces(drawn, motion, view)
+    state = drawing.gpu_state("LESS_EQUAL", depth_writes=False)
+    with buffer.seen_surfaces_of_part(picture_programs.CARRIED_MOTION_FORMAT), state:
+        _draw_surfaces(drawn, motion, view, has_after=False)
     return buffer.part(picture_programs.CARRIED_MOTION_FORMAT)
 
 
-def _draw_surfaces(drawn, motion, view):
-    """Draw motion vectors of surfaces into the bound framebuffer."""
-    program = picture_programs.surface_motion_program()
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True):
-            record, samplers = motion.surface(owner)
-            blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
-            with drawing.bound(program, blocks, samplers):
-                surface.corners.triangles.draw(program)
+def _draw_surfaces(drawn, motion, view, has_after):
+    """Draw motion vectors of surfaces into the bound framebuffer; has_after: as of `surface_motion_program`."""
+    program = picture_programs.surface_motion_program(has_after)
+    for (surface, _parts), owner in zip(drawn.surfaces, _unique(drawn.surface_owners), strict=True):
+        record, samplers = motion.surface(owner)
+        if not has_after:
+            del samplers["places_after"]
+        blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
+        with drawing.bound(program, blocks, samplers):
+            surface.corners.triangles.draw(program)
 
 
 def _of_hair(drawn, motion):

@@ -82,17 +82,22 @@ def strand_motion_program(is_batch=False, is_nearest=False):
 
 
 @shaders.cached
-def surface_motion_program():
-    """Return the program of motion vectors of surfaces: see picture/surface_motion.vert."""
+def surface_motion_program(has_after):
+    """Return the program of motion vectors of surfaces: see picture/surface_motion.vert.
+
+    has_after: also from the next frame; else surfaces are drawn over their own depth.
+    """
     info = gpu.types.GPUShaderCreateInfo()
+    names = ("now", "before", "after") if has_after else ("now", "before")
+    if has_after:
+        info.define("HAS_PLACE_AFTER")
     info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
     info.uniform_buf(0, "View", "view")
     info.uniform_buf(1, "Motion", "motion")
-    for slot, name in enumerate(("places", "places_before", "places_after")):
-        info.sampler(slot, "FLOAT_2D", name)
-    varying = gpu.types.GPUStageInterfaceInfo("motion_varying")
-    for name in ("place_now", "place_before", "place_after"):
-        varying.smooth("VEC4", name)
+    varying = gpu.types.GPUStageInterfaceInfo("motion_varying" if has_after else "motion_before_varying")
+    for slot, name in enumerate(names):
+        info.sampler(slot, "FLOAT_2D", "places" if name == "now" else f"places_{name}")
+        varying.smooth("VEC4", f"place_{name}")
     info.vertex_out(varying)
     return shaders.compile_drawing(info, "picture/surface_motion.vert", "picture/surface_motion.frag")
 

@@ -103,6 +103,8 @@ class HairPicture:
                 scene_drawing.draw_viewport_shadow(drawn, view)
             elif not is_see_through:
                 scene_drawing.draw_hiding(drawn, view, clip_planes)
+        if self.pass_count == 0:
+            self._history.draw_surfaces(drawn, camera, view, self._pass)
         is_counted = self.pass_count == 0 and self._detail.per_side == 1 and self._spreads is _SPREADS
         scene_drawing.draw_hair(drawn, view, self._pass, True, clip_planes, is_counted)
         if is_outlined:

@@ -76,6 +76,7 @@ class History:
         self._carried = self._blocks = None
         self._places = self._moved = None  # textures: the sample that represents each pixel, and its motion vector
         self._seen = None
+        self._surface_motion = None  # texture of motion vectors of surfaces from `draw_surfaces`
         self._is_carried = False
         self._relit = None  # _Targets: blocks of samples with the former lights, and with the current lights
         self._is_relit = False
@@ -127,6 +128,17 @@ class History:
         self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
         self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
 
+    def draw_surfaces(self, drawn, camera, view, buffer):
+        """Draw the motion vectors of surfaces that `add` needs for a first pass, whose surfaces were just drawn.
+
+        The GPU draws them while the hair of the pass is prepared. Parameters: as for `add`; buffer: `VisibilityBuffer`.
+        """
+        before, now, self._surface_motion = self._seen, _seen(drawn, camera), None
+        if before is not None and _are_same(before.looks, now.looks):
+            if not now.places.has_still_surfaces(before.places):
+                motion = motion_vectors.Motion(before.places, now.places, now.places, self.size)
+                self._surface_motion = motion_vectors.draw_surfaces(drawn, motion, view, buffer)
+
     def add(self, drawn, camera, view, samples, light, pass_count, part_left, has_lit_surfaces=False):
         """Add a pass, the pass_count-th of a picture.
 
@@ -174,7 +186,8 @@ class History:
             nearest = NearestSamples(self._places, detail.per_side, detail.corner, _REACH)
             motion_vectors.draw_nearest(drawn, motion, buffer, hair_motion, nearest)
         if has_surfaces:
-            surface_motion = motion_vectors.draw_surfaces(drawn, motion, view, buffer)
+            surface_motion = self._surface_motion or motion_vectors.draw_surfaces(drawn, motion, view, buffer)
+        self._surface_motion = None
         samplers = {
             "before": picture,
             "before_passes": passes,

@@ -248,20 +248,34 @@ def nearest_beside(depths, side):
 
 @pytest.mark.parametrize(("scale", "side"), [(1.0, 2), (0.01, 1)])
 def test_pixels_move_with_their_nearest_sample(lit, monkeypatch, scale, side):
-    """The motion vector of a pixel is that of the nearest sample in or beside it, in a part of the picture too."""
+    """The motion vector of a pixel is that of the nearest sample in or beside it, in a part of the picture too, and
+    seen surfaces have the motion vectors of renders.
+    """
     bpy.data.objects["Sphere"].scale = (-scale, scale, scale)
     if scale < 1.0:
         bpy.context.scene.camera.location.y *= 4.0 * scale
     picture, found, draw = new_picture("HAIR", SIZE, side), [], motion_vectors.draw_nearest
     monkeypatch.setattr(motion_vectors, "draw_nearest", lambda *given: (draw(*given), found.append(given)))
+    on_surfaces, draw_surfaces = [], motion_vectors.draw_surfaces
+    monkeypatch.setattr(
+        motion_vectors, "draw_surfaces", lambda *given: on_surfaces.append(draw_surfaces(*given)) or on_surfaces[-1]
+    )
     for degrees in (0.0, 5.0):
         turn_object(degrees)
         drawn, view = read_drawn(), camera()
         move(picture, drawn, view)
     ((drawn, motion, buffer, texture, nearest),) = found
-    vectors = np.array(motion_vectors.draw(drawn, motion, picture._view, buffer, has_surfaces=False).read(), np.float32)
+    wanted = [
+        np.array(motion_vectors.draw(drawn, motion, picture._view, buffer, has_surfaces).read(), np.float32)
+        for has_surfaces in (True, False)
+    ]
+    of_surfaces, vectors = (one.reshape(-1, 4) for one in wanted)
     width, height = buffer.size
     depths = np.array(buffer.depths.read(), np.int64).astype(np.uint32).view(np.float32).reshape(height, width)
+    is_surface = (depths.ravel() < 1.0) & (np.array(buffer.segments.read(), np.int64).ravel() >= NO_SEGMENT)
+    carried = np.array(on_surfaces[-1].read(), np.float32).reshape(-1, 2)
+    assert len(on_surfaces) == 1 and is_surface.sum() > 20 and np.abs(carried[is_surface]).max() > 0.01
+    np.testing.assert_array_equal(carried[is_surface], of_surfaces[is_surface, :2])
     left, bottom, columns, rows = picture._detail.tile
     inside = np.s_[bottom : bottom + rows, left : left + columns]
     places = np.array(nearest.texture.read(), np.int64).reshape(SIZE, SIZE)[inside]
@@ -270,7 +284,7 @@ def test_pixels_move_with_their_nearest_sample(lit, monkeypatch, scale, side):
     assert not places[places != expected].any()  # far from hair nothing is carried
     np.testing.assert_array_equal(places[is_hair], expected[is_hair])
     shown = np.array(texture.read(), np.float32).reshape(SIZE, SIZE, 2)[inside]
-    np.testing.assert_array_equal(shown[is_hair], vectors.reshape(-1, 4)[places][is_hair, :2])
+    np.testing.assert_array_equal(shown[is_hair], vectors[places][is_hair, :2])
     assert is_hair.sum() > 50 and np.abs(shown[is_hair]).max() > 0.01
     assert (scale == 1.0) == (picture._detail.tile == (0, 0, SIZE, SIZE))
 
