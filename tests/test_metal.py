@@ -13,7 +13,7 @@ from hair_addon.core.shading.light_paths import gather, seen_rays, start_places
 SHADERS = Path(__file__).resolve().parents[1] / "shaders"
 SOURCES = sorted([*SHADERS.rglob("*.*"), *(SHADERS.parent / "hair_addon" / "core").rglob("*.strand")])
 GLSL = [path for path in SOURCES if path.suffix != ".md"]
-KERNELS = gather._gather, gather._even, start_places._count, start_places._see, seen_rays._find, seen_rays._place
+KERNELS = gather._gather, gather._even, start_places._measure, start_places._see, seen_rays._find, seen_rays._place
 TRANSLATED = {kernel.key: glsl_text.kernel_text(kernel).source for kernel in KERNELS}
 
 # Keywords of C++ and of the language that GLSL lets be names, and what Blender's backend defines as macros.

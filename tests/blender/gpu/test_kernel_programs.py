@@ -182,7 +182,9 @@ def paths_of(grid, light, count):
     """
     seen, mesh = seen_rays.seen_by(grid, light.corners, ALONG_Y, count), media.mesh_of(light.corners)
     medium = media.medium_of(grid, mesh, light.normals, light.albedo, light.gloss)
-    starts = start_places.of_seen(medium, seen, start_places.voxels_of(medium, seen.places)[0], count, 0)
+    levels, _voxel_count = start_places.voxels_of(medium, seen.places)
+    areas = start_places.areas_of(medium, seen, levels)
+    starts = start_places.of_seen(medium, seen, levels, areas, count, 0)
     given = {
         "medium": medium,
         "sources": media.sources_of(light, 0.01),

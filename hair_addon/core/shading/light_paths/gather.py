@@ -223,6 +223,8 @@ class PathSums:
         faint = _FAINT * voxel_sums.brightness(seen.drawn)[0] / len(seen.segments)
         self._sources = sources_of(self._surroundings, faint)
         self._levels, self._voxel_count = start_places.voxels_of(self._medium, seen.places)
+        self._areas = None  # `start_places.areas_of` the levels, computed with the next paths
+        self._is_even = False
         self._found_squares = np.zeros(2)  # of the light of paths, and of the same with even density
         return even
 
@@ -234,7 +236,9 @@ class PathSums:
         if self._seen is None or not len(self._seen.segments):
             return
         with wp.ScopedDevice(self.grid.device):
-            starts = start_places.of_seen(self._in_sight, self._seen, self._levels, count, seed)
+            if self._areas is None:
+                self._areas = start_places.areas_of(self._in_sight, self._seen, self._levels)
+            starts = start_places.of_seen(self._in_sight, self._seen, self._levels, self._areas, count, seed)
             traced = _traced(self._medium, self._sources, self._seen.view, starts, progress)
             positions, light, even, *parts = traced
             if self._parts is not None:
@@ -256,8 +260,9 @@ class PathSums:
     def _compare_density(self, squares, even_squares):
         """Start further paths with even density unless other density reduces the squares of their light enough."""
         self._found_squares += np.array([squares, even_squares])
-        if self._found_squares[0] > start_density.WORTH * self._found_squares[1]:
+        if not self._is_even and self._found_squares[0] > start_density.WORTH * self._found_squares[1]:
             start_density.set_even(self._levels)
+            self._areas, self._is_even = None, True
 
     @property
     def wanted(self) -> float:

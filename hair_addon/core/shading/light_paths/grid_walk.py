@@ -11,7 +11,7 @@ side. A ray does not hit the strand that it leaves, even in bends.
 import warp as wp
 
 from .fibre_walk import Fibre
-from .strand_cells import LINE_ERROR, line_from
+from .strand_cells import LINE_CENTRE, LINE_ERROR, line_from, line_step
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -28,6 +28,7 @@ class Medium:
     voxel: float
     shape: wp.vec3i
     along_voxel: int
+    at_once: int  # number of lines compared with a ray at once
     widths: wp.vec4  # of segments: the largest radius and its halves [m]
     bricks: wp.array[int]
     starts: wp.array[int]
@@ -184,17 +185,29 @@ def _leaves(corner: wp.vec3, cell: wp.vec3i, side: float, position: wp.vec3, dir
 
 
 @wp.func
-def _comes_near(medium: Medium, turn: int, from_centre: wp.vec3, side: float, direction: wp.vec3):
-    """Whether a ray may hit one of the cell's segments within the cell; from_centre: its origin relative to the cell's
-    center.
+def _near(medium: Medium, first: int, end: int, from_centre: wp.vec3, side: float, direction: wp.vec3):
+    """Return a bit for each of the next `at_once` entries of a cell: whether a ray may hit its segment within the cell.
 
     It may if the distance to the segment's stored line is at most the radius plus the line's rounding error.
+    first, end: entries; from_centre: the ray's origin relative to the cell's center [m]. Compilers use SIMD
+    instructions for a `while` loop without branches.
     """
-    point, along, halvings = line_from(medium.lines[2 * turn], medium.lines[2 * turn + 1], side)
-    normal = wp.cross(direction, along)
-    beside = wp.dot(point - from_centre, normal)
-    radius = medium.widths[halvings] + LINE_ERROR * side
-    return beside * beside < radius * radius * wp.dot(normal, normal)
+    near = wp.uint32(0)
+    step = line_step(side)
+    origin = from_centre / step + wp.vec3(LINE_CENTRE, LINE_CENTRE, LINE_CENTRE)
+    least = medium.widths[3] / step
+    error = LINE_ERROR * side / step
+    number = int(0)
+    while number < medium.at_once:
+        entry = wp.min(first + number, end - 1)  # the last entry again has no effect
+        point, along, wider = line_from(medium.lines[2 * entry], medium.lines[2 * entry + 1])
+        normal = wp.cross(direction, along)
+        beside = wp.dot(point - origin, normal)
+        radius = least * wider + error
+        is_near = beside * beside < radius * radius * wp.dot(normal, normal)
+        near = near | wp.where(is_near, wp.uint32(1) << wp.uint32(number), wp.uint32(0))
+        number += 1
+    return near
 
 
 @wp.func
@@ -235,19 +248,28 @@ def _trace_cell(
 
     is_any: one to stop at any hit, whose distance is returned as zero.
     """
-    for turn in range(medium.starts[index], medium.starts[index + 1]):
-        if _comes_near(medium, turn, position - centre, side, direction):
-            segment = medium.segments[turn]
-            if medium.strands[segment] != own:
-                distance, offset = crossing(medium, segment, position, direction)
-                if distance < end:
-                    end = distance
-                    hit.kind = STRAND
-                    hit.index = segment
-                    hit.offset = offset
-                    if is_any > 0:
-                        end = 0.0
-                        break
+    first = medium.starts[index]
+    last = medium.starts[index + 1]
+    while first < last:
+        near = _near(medium, first, last, position - centre, side, direction)
+        entry = int(first)
+        first += medium.at_once
+        while near > wp.uint32(0):
+            if (near & wp.uint32(1)) > wp.uint32(0) and entry < last:
+                segment = medium.segments[entry]
+                if medium.strands[segment] != own:
+                    distance, offset = crossing(medium, segment, position, direction)
+                    if distance < end:
+                        end = distance
+                        hit.kind = STRAND
+                        hit.index = segment
+                        hit.offset = offset
+                        if is_any > 0:
+                            end = 0.0
+                            first = last
+                            near = wp.uint32(0)
+            near = near >> wp.uint32(1)
+            entry += 1
     return end, hit
 
 

@@ -16,6 +16,7 @@ from .strand_grid import StrandGrid
 from .world_light import world_of
 
 _LEAST_PATHS = 1024  # fewer are not worth a thread
+_AT_ONCE = 8  # lines that a processor compares with a ray by SIMD instructions
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,7 @@ def medium_of(
     medium.corner, medium.voxel, medium.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
     cells = grid.cells
     medium.along_voxel = cells.along_voxel
+    medium.at_once = _AT_ONCE if grid.device.is_cpu else 1
     medium.widths = wp.vec4(*cells.widths.tolist())
     medium.bricks, medium.starts, medium.segments, medium.lines = (
         cells.bricks,

@@ -70,23 +70,18 @@ def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Hit, direction: wp.v
 
 
 @wp.kernel
-def _count(
+def _measure(
     medium: Medium,
     view: ViewOnDevice,
     levels: wp.array3d[wp.uint8],
-    density: float,
-    most: int,
-    seed: int,
-    out_count: wp.array[int],
+    out_areas: wp.array[float],
     first: int,
 ):
-    """Count the places to try on each segment: at most `most`, and `density` per unit of area in the picture, times the
-    density of the segment's level.
-    """
+    """Compute the area of each segment in the picture, times the density of the segment's level."""
     segment = first + wp.tid()
     start = medium.points[segment]
     end = medium.points[segment + 1]
-    count = int(0)
+    found = float(0.0)
     level = level_at(levels, medium.corner, medium.voxel, start, end, _MOST_PLACES)
     if level > 0 and medium.strands[segment] == medium.strands[segment + 1]:
         middle = 0.5 * (start + end)
@@ -95,12 +90,22 @@ def _count(
         if depth_at(view, middle, direction) <= 0.0:
             area = 0.0  # unbounded in front of the near plane
         width = medium.radii[segment] + medium.radii[segment + 1]
-        wanted = wp.length(wp.cross(end - start, direction)) * width * area * density * density_of(level)
-        if wanted < float(most):
+        found = wp.length(wp.cross(end - start, direction)) * width * area * density_of(level)
+    out_areas[segment] = found
+
+
+@wp.kernel
+def _count(areas: wp.array[float], density: float, most: int, seed: int, out_count: wp.array[int], first: int):
+    """Count the places to try on each segment: at most `most`, and `density` per unit of `areas_of`."""
+    segment = first + wp.tid()
+    wanted = areas[segment] * density
+    count = int(0)
+    if wanted < float(most):
+        if wanted > 0.0:
             state = wp.rand_init(seed, segment)
             count = int(wanted + wp.randf(state))
-        else:
-            count = most
+    else:
+        count = most
     out_count[segment] = count
 
 
@@ -189,11 +194,11 @@ def _total(counts):
     return int(totals.numpy().sum())
 
 
-def _tries(medium, view, levels, density, count, seed, device):
+def _tries(areas, density, count, seed):
     """Return (segments,) the number of tried places of each, reduced if there would be too many for `count` paths."""
-    counts, most = wp.zeros(max(len(medium.points) - 1, 0), dtype=int), count
+    counts, most = wp.empty(len(areas), dtype=int), count
     while True:
-        launch(_count, len(counts), [medium, view, levels, density, most, seed, counts], device)
+        launch(_count, len(counts), [areas, density, most, seed, counts], areas.device)
         tries = _total(counts)
         if tries <= _MOST_TRIES * count:
             return counts
@@ -243,16 +248,29 @@ def _keep(
         out_keys[ends[place] - 1] = keys[place]
 
 
-def of_seen(medium: Medium, seen: Seen, levels: wp.array3d[wp.uint8], count: int, seed: int) -> Starts:
-    """Return about `count` `Starts`, on the device of a medium.
+def areas_of(medium: Medium, seen: Seen, levels: wp.array3d[wp.uint8]) -> wp.array[float]:
+    """Return the areas (segments,) of a medium's segments in the picture, times the densities of their levels.
 
     levels: of voxels with visible hair, from `voxels_of` or `start_density.set_levels`.
     """
+    device = medium.points.device
+    for side, wanted in zip(levels.shape[::-1], medium.shape, strict=True):
+        require_count("voxels", side, int(wanted))
+    areas = wp.empty(max(len(medium.points) - 1, 0), dtype=float, device=device)
+    launch(_measure, len(areas), [medium, on_device(seen.view), levels, areas], device)
+    return areas
+
+
+def of_seen(
+    medium: Medium, seen: Seen, levels: wp.array3d[wp.uint8], areas: wp.array[float], count: int, seed: int
+) -> Starts:
+    """Return about `count` `Starts`, on the device of a medium; areas: `areas_of` these levels."""
     device, seen_in = medium.points.device, on_device(seen.view)
     for side, wanted in zip(levels.shape[::-1], medium.shape, strict=True):
         require_count("voxels", side, int(wanted))
+    require_count("areas", len(areas), max(len(medium.points) - 1, 0))
     with wp.ScopedDevice(device):
-        counts = _tries(medium, seen_in, levels, count / (len(seen.segments) * seen.area), count, seed, device)
+        counts = _tries(areas, count / (len(seen.segments) * seen.area), count, seed)
         ends, tries = running_sums.ends_of(counts)
         segments, keys, in_sight = (wp.zeros(tries, dtype=int) for _ in range(3))
         launch(_list, len(counts), [counts, ends, _product(seed + 1), segments, keys], device)

@@ -20,6 +20,7 @@ _LEAST_SEGMENTS = 20_000  # fewer are not worth a thread
 _WIDER = wp.constant(1e-4)  # enlargement of segments for rounding, relative to a cell
 _REACH = wp.constant(1.7321)  # greatest distance in cells from a cell's center to the nearest point of a line
 _STEPS = wp.constant(1023.0)  # steps of this point's place, along each axis
+LINE_CENTRE = wp.constant(511.5)  # half of these steps
 _TURNS = wp.constant(65535.0)  # steps of a line's direction, along both axes
 LINE_ERROR = wp.constant(0.004)  # maximum distance in cells between a line and its stored form
 _WIDTHS = wp.constant(4)  # number of stored radii, each half the previous one
@@ -139,19 +140,29 @@ def line_of(origin: wp.vec3, way: wp.vec3, centre: wp.vec3, side: float, halving
 
 
 @wp.func
-def line_from(where: wp.uint32, turned: wp.uint32, side: float):
-    """Return (point relative to the cell's center, direction of any length, halvings) from the words of `line_of`."""
+def line_step(side: float):
+    """Return the distance between two places of `line_from` [m]; side: of the cells [m]."""
+    return 2.0 * _REACH * side / _STEPS
+
+
+@wp.func
+def line_from(where: wp.uint32, turned: wp.uint32):
+    """Return (point relative to a corner of the stored places, in `line_step`; direction of any length; radius relative
+    to the smallest of `StrandCells.widths`) from the words of `line_of`. The cell's center is at `LINE_CENTRE` along
+    each axis.
+    """
     mask = wp.uint32(1023)
-    scale = 2.0 * _REACH * side / _STEPS
-    point = wp.vec3(float(where & mask), float((where >> wp.uint32(10)) & mask), float((where >> wp.uint32(20)) & mask))
-    middle = _REACH * side
-    x = float(turned & wp.uint32(65535)) * (2.0 / _TURNS) - 1.0
-    y = float(turned >> wp.uint32(16)) * (2.0 / _TURNS) - 1.0
-    z = 1.0 - wp.abs(x) - wp.abs(y)
-    below = wp.max(-z, 0.0)
-    x -= wp.where(x < 0.0, -below, below)
-    y -= wp.where(y < 0.0, -below, below)
-    return scale * point - wp.vec3(middle, middle, middle), wp.vec3(x, y, z), int(where >> wp.uint32(30))
+    # Processors convert several signed integers at once.
+    x = float(int(where & mask))
+    y = float(int((where >> wp.uint32(10)) & mask))
+    z = float(int((where >> wp.uint32(20)) & mask))
+    u = float(int(turned & wp.uint32(65535))) - 0.5 * _TURNS
+    v = float(int(turned >> wp.uint32(16))) - 0.5 * _TURNS
+    w = 0.5 * _TURNS - wp.abs(u) - wp.abs(v)
+    below = wp.min(w, 0.0)
+    u += wp.where(u < 0.0, -below, below)
+    v += wp.where(v < 0.0, -below, below)
+    return wp.vec3(x, y, z), wp.vec3(u, v, w), float((1 << (_WIDTHS - 1)) >> int(where >> wp.uint32(30)))
 
 
 @wp.func

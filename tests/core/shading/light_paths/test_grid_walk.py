@@ -16,7 +16,7 @@ from hair_addon.core.shading.light_paths.grid_walk import (
     is_blocked,
     walk,
 )
-from hair_addon.core.shading.light_paths.strand_cells import LINE_ERROR, line_from, line_of
+from hair_addon.core.shading.light_paths.strand_cells import LINE_CENTRE, LINE_ERROR, line_from, line_of, line_step
 from tests.core.shading.light_paths.test_gather import WHITE, grid_of
 
 wp.set_module_options({"enable_backward": False})
@@ -102,6 +102,9 @@ def test_the_nearest_segment_is_found(rng, voxel_count):
         numbers = wp.array(own, dtype=int)
         found = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int, int)]
         wp.launch(_by_walking, RAYS, [*given, FAR, numbers], found)
+        medium.at_once = 1  # as on a GPU
+        one_by_one = [wp.zeros(RAYS, dtype=kind) for kind in (int, float, int, int)]
+        wp.launch(_by_walking, RAYS, [*given, FAR, numbers], one_by_one)
         expected = [wp.zeros(RAYS, dtype=kind) for kind in (float, int)]
         wp.launch(_by_all_segments, RAYS, [*given, numbers], expected)
     kinds, distances, segments, blocked = (array.numpy() for array in found)
@@ -112,6 +115,8 @@ def test_the_nearest_segment_is_found(rng, voxel_count):
     assert (blocked == is_met).all()
     assert (segments[is_met] == nearest_segments[is_met]).mean() > 0.999  # two that cross are as near
     assert np.abs(distances - nearest)[is_met].max() < 1e-5
+    for values, of_one in zip(found, one_by_one, strict=True):
+        np.testing.assert_array_equal(values.numpy(), of_one.numpy())
 
 
 def test_strands_hide_a_wall_and_it_hides_them(rng):
@@ -148,14 +153,14 @@ def _there_and_back(
     side: float,
     out_points: wp.array[wp.vec3],
     out_ways: wp.array[wp.vec3],
-    out_halvings: wp.array[int],
+    out_widths: wp.array[float],
 ):
     line = wp.tid()
     where, turned = line_of(origins[line], ways[line], wp.vec3(0.0, 0.0, 0.0), side, line % 4)
-    point, way, halvings = line_from(where, turned, side)
-    out_points[line] = point
+    point, way, wider = line_from(where, turned)
+    out_points[line] = line_step(side) * (point - wp.vec3(LINE_CENTRE, LINE_CENTRE, LINE_CENTRE))
     out_ways[line] = way
-    out_halvings[line] = halvings
+    out_widths[line] = wider
 
 
 def test_lines_are_kept_as_well_as_it_is_said(rng):
@@ -164,12 +169,12 @@ def test_lines_are_kept_as_well_as_it_is_said(rng):
     ways = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-4.0, 0.0, (count, 1))
     ways[::10] *= np.eye(3)[rng.integers(0, 3, len(ways[::10]))]  # along axes, where an octahedron has its corners
     origins = nearest + rng.uniform(-3.0, 3.0, (count, 1)) * ways
-    found = [wp.zeros(count, dtype=kind, device="cpu") for kind in (wp.vec3, wp.vec3, int)]
+    found = [wp.zeros(count, dtype=kind, device="cpu") for kind in (wp.vec3, wp.vec3, float)]
     rows = [wp.array(values, dtype=wp.vec3, device="cpu") for values in (origins, ways)]
     wp.launch(_there_and_back, count, [*rows, side], found, device="cpu")
-    points, kept, halvings = (array.numpy().astype(float) for array in found)
+    points, kept, widths = (array.numpy().astype(float) for array in found)
     unit, kept = (values / np.linalg.norm(values, axis=1, keepdims=True) for values in (ways, kept))
-    assert (halvings == np.arange(count) % 4).all()
+    assert (widths == 0.5 ** (np.arange(count) % 4 - 3.0)).all()
     ends = points[:, None] + np.array([-1.7, 0.0, 1.7])[:, None] * side * kept[:, None]
     beside = np.cross(ends - origins[:, None], unit[:, None])
     assert np.linalg.norm(beside, axis=-1).max() < LINE_ERROR * side
