@@ -384,8 +384,9 @@ def restyle(
     if not read.is_same(bound.styles.read):
         if not has_scale:
             return False
-        trees = bound.styles.shared_trees()
-        styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees)
+        before = bound.styles
+        trees = before.shared_trees()
+        styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, trees, former=before)
         bound.restyle(styles, is_drawn(bound, styles))
     varied_strands.apply(target, bound)
     return True

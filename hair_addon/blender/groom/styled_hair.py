@@ -154,8 +154,13 @@ def bind(
     surface: Surface,
     make_trees: Callable[[], ClumpTrees],
     progress: Progress = no_progress,
+    former: StyledHair | None = None,
 ) -> StyledHair:
-    """Bind styles and lengths to strands; make_trees: called if one needs clump trees or a surface."""
+    """Bind styles and lengths to strands.
+
+    make_trees: called if one needs clump trees or a surface; former: `StyledHair` of the same hair, whose arrays are
+    reused where they are equal.
+    """
     cut = strand_lengths.cut_mask(read.length, settings)
     if cut is None and grooming.style_binding.is_plain(guides, settings, read.styles):
         return StyledHair(read, None, make_trees)
@@ -173,6 +178,7 @@ def bind(
         grooming.style_binding.own_axes((Affine.linear(surface.to_world_axes) @ read.applied).matrix),
         progress,
         cut,
+        None if former is None else former.styling,
     )
     return StyledHair(read, styling, make_trees)
 

@@ -77,12 +77,13 @@ def bind_styles(
     axes: np.ndarray | None = None,
     progress: Progress = no_progress,
     cut: CutMask | None = None,
+    former: "Styling | None" = None,
 ) -> "Styling | None":
     """Return the `Styling` of strands; None if strands follow their guides unchanged (`is_plain`).
 
     axes: (4, 4) to the surface's own coordinates, from `own_axes`, None for the identity; progress(step, part):
     callback for the placement of clump sites, may raise to cancel; cut: the `CutMask` of strands whose lengths differ,
-    None for the length of the settings.
+    None for the length of the settings; former: as of `stack.bind`.
     """
     if cut is None and is_plain(guides, settings, styles):
         return None
@@ -97,7 +98,7 @@ def bind_styles(
         inputs = replace(inputs, masks=masks, numbers=_below(inputs.numbers), courses=_below(inputs.courses))
         varied = {place + 1: found for place, found in varied.items()}
     axes = np.eye(4) if axes is None else axes
-    return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count, varied)
+    return styling.stack.bind(binding, guides, styles, inputs, trees, axes, settings.point_count, varied, former)
 
 
 def _below(of_styles):

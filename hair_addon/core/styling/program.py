@@ -164,8 +164,7 @@ def same_steps(program: Program, data: "StrandData", other: Program, other_data:
     _kinds, _seeds, masks, levels, _centres, varied, first_varied, packed = choices.T
     if not np.array_equal(program.courses, other.courses):
         is_same &= packed == 0
-    is_mask_same = _are_rows_same(data.masks_here, other_data.masks_here)
-    is_member_same = _are_rows_same(data.members_here, other_data.members_here)
+    is_mask_same, is_member_same = data.are_rows_same(other_data)
     for step in np.flatnonzero(is_same).tolist():
         end = first_varied[step] + int(varied[step]).bit_count()
         are_same = is_mask_same[first_varied[step] : end].all() if varied[step] else True
@@ -175,13 +174,3 @@ def same_steps(program: Program, data: "StrandData", other: Program, other_data:
             and (levels[step] < 0 or is_member_same[levels[step]])
         )
     return count if is_same.all() else int(np.argmin(is_same))
-
-
-def _are_rows_same(rows, others):
-    """Return for each row whether the other array has the same row."""
-    found = np.zeros(len(rows), bool)
-    if rows is others or rows.shape[1:] != others.shape[1:]:
-        return found | (rows is others)
-    for row in range(min(len(rows), len(others))):
-        found[row] = np.array_equal(rows[row], others[row])
-    return found

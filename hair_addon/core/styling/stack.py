@@ -60,6 +60,9 @@ class _Level:
 class Styling:
     """Styles bound to the strands of one hair, from `stack.bind`."""
 
+    binding: HairBinding
+    side: int  # from `_side`
+    guide_identities: np.ndarray  # (G,) int32
     styles: tuple[StyleSettings, ...]
     inputs: Inputs
     trees: ClumpTrees
@@ -234,12 +237,13 @@ def bind(
     axes: np.ndarray,
     point_count: int,
     varied: Mapping[int, varied_numbers.VariedTree] = MappingProxyType({}),
+    former: Styling | None = None,
 ) -> Styling:
     """Bind styles to strands; sites that `trees` does not contain yet are placed and bound.
 
     binding and guides of the strands; inputs: `Inputs` of the styles; axes: (4, 4), from the coordinates of strands to
     the surface's own, without scale; point_count: points per strand; varied: from
-    `varied_numbers.varied_trees`.
+    `varied_numbers.varied_trees`; former: a `Styling` of the same hair whose arrays are reused where they are equal.
     """
     levels = programs.tree_levels(styles, {place: found.tree for place, found in varied.items()})
     choosers = [varied.get(place) for place, style in enumerate(styles) for _level in _levels_of(style)]
@@ -249,14 +253,20 @@ def bind(
     made = programs.strand_steps(styles, inputs.cutters)
     numbers = varied_numbers.places_of(made, inputs.numbers)
     program = programs.compiled(made, keys, first_centres, numbers, inputs.courses)
-    identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
     side = _side(guides, binding.guide_normals.numpy())
-    centre_arrays = _centre_arrays(bindings, binding, identities, side, point_count)
+    own, of_levels, are_centres_same = _former_data(former, binding, bindings, side)
+    known_centres = own if are_centres_same else None
+    if former is not None and are_centres_same:
+        identities = former.guide_identities
+    else:
+        identities = geometry.root_frames.identities(guides.roots, binding.is_mirrored)[0]
+    centre_arrays = _centre_arrays(bindings, binding, identities, side, point_count, known_centres)
     reader = _StrandReader(inputs, trees, levels, choosers, bindings, made, numbers, keys, side, centre_arrays)
     centres = []
     for row, bound in enumerate(bindings):
         before = _steps_before(program, made, row)
-        centres.append(_Level(bound, first_centres[row], before, reader.data_of(levels[row], bound, row, len(before))))
+        data = reader.data_of(levels[row], bound, row, len(before), of_levels[row])
+        centres.append(_Level(bound, first_centres[row], before, data))
     if levels:
         used = {tree for tree, _level in levels}
         trees.keep_only(used.union(*(tree.variants for tree in used)))
@@ -272,11 +282,14 @@ def bind(
         inputs.courses,
     )
     return Styling(
+        binding,
+        side,
+        identities,
         tuple(styles),
         inputs,
         trees,
         program,
-        reader.data_of(HAIR, binding, len(levels), len(made)),
+        reader.data_of(HAIR, binding, len(levels), len(made), own),
         np.asarray(axes, np.float64),
         FollowedGuides(trees.binder.mesh, leaning, point_count),
         point_count,
@@ -300,19 +313,27 @@ class _StrandReader:
     side: int  # from `_side`
     centre_arrays: "dict[str, wp.array]"
 
-    def data_of(self, owner: Owner, bound: HairBinding, known: int, step_count: int) -> StrandData:
+    def data_of(
+        self, owner: Owner, bound: HairBinding, known: int, step_count: int, former: StrandData | None
+    ) -> StrandData:
         """Return the `StrandData` of strands that may belong to centers of the first `known` levels.
 
-        step_count: number of first steps, which are applied to these strands.
+        step_count: number of first steps, which are applied to these strands; former: `StrandData` of the same strands
+        for other settings, None: unknown.
         """
         device = self.centre_arrays["centre_normals"].device
         members = self._members_of(owner, bound, known)
         weights = self._weights_of(bound, members, _finest_clumps(self.levels, owner, members, known), step_count)
+        if former is None:
+            normals = bound.normals if self.side == 1 else _joined([self.side * bound.normals.numpy()], wp.vec3, device)
+            identities = wp.array(bound.identities[0], dtype=int, device=device)
+        else:
+            normals, identities = former.normals, former.identities
         return StrandData(
-            bound.normals if self.side == 1 else _joined([self.side * bound.normals.numpy()], wp.vec3, device),
-            wp.array(bound.identities[0], dtype=int, device=device),
-            wp.array(weights, dtype=float, device=device),
-            wp.array(members, dtype=int, device=device),
+            normals,
+            identities,
+            _kept(former and former.masks, former and former.masks_here, weights, float, device),
+            _kept(former and former.members, former and former.members_here, members, int, device),
             **self.centre_arrays,
         )
 
@@ -340,13 +361,37 @@ class _StrandReader:
         return np.array(values, np.float32).reshape(len(values), len(bound.roots))
 
 
-def _centre_arrays(bindings, binding, guide_identities, side, point_count):
-    """Return {field of `StrandData`: array} of the centers of all levels; the last are guides, without points."""
+def _former_data(former, binding, bindings, side):
+    """Return (`StrandData` of the strands, [of the centers of each level], whether all centers are the same) of a
+    former `Styling`; None where strands or centers differ.
+    """
+    if former is None or former.binding is not binding or former.side != side:
+        return None, [None] * len(bindings), False
+    known = {id(level.binding): level.data for level in former.levels}
+    are_same = [id(level.binding) for level in former.levels] == list(map(id, bindings))
+    return former.data, [known.get(id(bound)) for bound in bindings], are_same
+
+
+def _kept(array, rows, values, kind, device):
+    """Return a Warp array of values, the former one if its rows are equal; rows: None without a former array."""
+    if rows is not None and np.array_equal(rows, values):
+        return array
+    return wp.array(values, dtype=kind, device=device)
+
+
+def _centre_arrays(bindings, binding, guide_identities, side, point_count, former):
+    """Return {field of `StrandData`: array} of the centers of all levels; the last are guides, without points.
+
+    former: `StrandData` with the same centers, None: unknown. Points are never shared, as other threads may still style
+    the former strands.
+    """
     device = binding.positions.device
-    normals = [side * bound.normals.numpy() for bound in bindings]
     count = sum(len(bound.roots) for bound in bindings)
-    return {
-        "centre_points": wp.zeros((count, point_count), dtype=wp.vec4, device=device),
+    points = {"centre_points": wp.zeros((count, point_count), dtype=wp.vec4, device=device)}
+    if former is not None:
+        return points | {"centre_normals": former.centre_normals, "centre_identities": former.centre_identities}
+    normals = [side * bound.normals.numpy() for bound in bindings]
+    return points | {
         "centre_normals": _joined([*normals, side * binding.guide_normals.numpy()], wp.vec3, device),
         "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
     }

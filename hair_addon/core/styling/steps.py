@@ -67,6 +67,22 @@ class StrandData:
         """`members` on the CPU, copied once from a GPU."""
         return self.members.numpy()
 
+    def are_rows_same(self, other: "StrandData") -> tuple[np.ndarray, np.ndarray]:
+        """Return for each row of `masks`, and of `members`, whether other data have the same row."""
+        if self.masks is other.masks and self.members is other.members:
+            return np.ones(len(self.masks), bool), np.ones(len(self.members), bool)
+        return _are_same(self.masks_here, other.masks_here), _are_same(self.members_here, other.members_here)
+
+
+def _are_same(rows, others):
+    """Return for each row whether the other array has the same row."""
+    found = np.zeros(len(rows), bool)
+    if rows.shape[1:] != others.shape[1:]:
+        return found
+    for row in range(min(len(rows), len(others))):
+        found[row] = np.array_equal(rows[row], others[row])
+    return found
+
 
 @dataclass(frozen=True)
 class Variant:

@@ -16,7 +16,7 @@ from hair_addon.core.interpolation import guide_weights
 from hair_addon.core.interpolation.regions import Regions
 from hair_addon.core.kernels import kernel_cache
 from hair_addon.core.styling import braid, clump, curl, frizz, guide_lean, lean, program, smooth, steps, wet
-from hair_addon.core.styling.masks import Mask
+from hair_addon.core.styling.masks import Inputs, Mask
 from hair_addon.core.styling.stack import HAIR
 from tests.support.devices import DEVICE
 from tests.support.meshes import flat_grid
@@ -248,6 +248,35 @@ def test_strands_and_centres_that_are_not_there_are_refused(hair, stack, member)
         steps.apply_steps(points, bound.program, data, np.eye(4))
     with pytest.raises(HairError, match="strands"):
         hair.styled(*STACKS[stack], chosen=np.array([3, member]))
+
+
+FIELDS = ("normals", "identities", "masks", "members", "centre_normals", "centre_identities")
+LOCKS, CURLS, FRIZZ = STACK[0], replace(STACK[1], mask="shared"), STACK[2]
+OTHERS = {
+    "slider": (LOCKS, replace(CURLS, amount=0.5), FRIZZ),
+    "crossover": (replace(LOCKS, crossover=0.3), CURLS, FRIZZ),
+    "fewer levels": (replace(LOCKS, levels=2), CURLS, FRIZZ),
+    "other locks": (replace(LOCKS, size=0.04), CURLS, FRIZZ),
+    "more locks": (LOCKS, clump.Settings(size=0.015, levels=1, seed=4), CURLS, FRIZZ),
+    "no locks": (CURLS, FRIZZ),
+    "another mask": (LOCKS, replace(CURLS, mask="own"), FRIZZ),
+    "another order": (FRIZZ, LOCKS, CURLS),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_former_styling_does_not_change_the_next(hair, rng, name):
+    """Styles bound with the arrays of a former `Styling` have the same arrays as without; a slider copies none."""
+    shared, own = ((mask, rng.random(60).astype(np.float32)) for mask in ("shared", "own"))
+    masks = {program.mask_key(replace(CURLS, mask=mask)): Mask(guides=weights) for mask, weights in (shared, own)}
+    before = hair.bound(LOCKS, CURLS, FRIZZ, inputs=Inputs(masks))
+    fresh, reused = (hair.bound(*OTHERS[name], inputs=Inputs(masks), former=former) for former in (None, before))
+    for one, other in zip([fresh, *fresh.levels], [reused, *reused.levels], strict=True):
+        for label in FIELDS:
+            np.testing.assert_array_equal(getattr(one.data, label).numpy(), getattr(other.data, label).numpy())
+    is_kept = [getattr(reused.data, label) is getattr(before.data, label) for label in FIELDS]
+    assert all(is_kept) == (name in ("slider", "another order"))
+    assert reused.data.centre_points is not before.data.centre_points  # other threads may still write to it
 
 
 def test_a_mask_of_guides_is_mixed_as_strands_are(hair, rng):

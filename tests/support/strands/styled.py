@@ -37,10 +37,11 @@ class Groom:
         """Return (S, 41, 3): strands without styles."""
         return following.follow_guides(self.binding, self.guides).numpy()
 
-    def bound(self, *styles, inputs=None, point_count=None):
+    def bound(self, *styles, inputs=None, point_count=None, former=None):
         """Return the `Styling` of styles."""
         settings = self.settings if point_count is None else replace(self.settings, point_count=point_count)
-        return style_binding.bind_styles(self.binding, self.guides, settings, styles, self.trees, inputs, self.axes)
+        own = self.binding, self.guides, settings, styles, self.trees
+        return style_binding.bind_styles(*own, inputs, self.axes, former=former)
 
     def styled(self, *styles, inputs=None, point_count=None, guides=None, chosen=None):
         """Return (S, P, 3), or (M, P, 3) of some strands."""

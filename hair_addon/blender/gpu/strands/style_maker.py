@@ -383,8 +383,8 @@ def _same_steps(now, before, changed):
 
 def _have_same_rows(data, other):
     """Whether strands have the same masks and clump centers."""
-    pairs = (data.masks_here, other.masks_here), (data.members_here, other.members_here)
-    return all(np.array_equal(rows, others) for rows, others in pairs)
+    has_as_many = len(data.masks) == len(other.masks) and len(data.members) == len(other.members)
+    return has_as_many and all(are_same.all() for are_same in data.are_rows_same(other))
 
 
 @shaders.cached
