@@ -103,7 +103,7 @@ def bounding_sphere(hair):
     """
     corners = []
     for strands, to_world in hair:
-        corners.append(windows.corners_of(strands.bounds) @ to_world[:3, :3].T + to_world[:3, 3])
+        corners.append(windows.corners_of(strands.box.likely) @ to_world[:3, :3].T + to_world[:3, 3])
     corners = np.concatenate(corners)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
@@ -111,7 +111,7 @@ def bounding_sphere(hair):
 
 def bounding_spheres(strands, to_world):
     """Return (N, 3) centers and (N,) radii [m] of `bounding_sphere` around `StrandsOnGPU` at (N, 4, 4) places."""
-    corners = windows.corners_of(strands.bounds) @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
+    corners = windows.corners_of(strands.box.likely) @ to_world[:, :3, :3].transpose(0, 2, 1) + to_world[:, None, :3, 3]
     centres = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
     return centres, np.maximum(np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1), _LEAST_RADIUS)
 

@@ -119,7 +119,7 @@ def _shape(strands, to_world):
     """Return (N, 3) centers and (N,) radii of spheres around `StrandsOnGPU` at (N, 4, 4) places, and (N,) smallest
     scales divided by the largest; cached until the strands or their places change.
     """
-    key = to_world.tobytes()
+    key = to_world.tobytes(), strands.box.is_exact
     if key not in strands.shapes:
         strands.shapes.clear()
         scales = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)

@@ -92,13 +92,17 @@ class ShadowMaps:
             return
         draw = partial(self._draw, lights, hair, surfaces, steps, casters, is_steady, chosen, counted)
         is_kept, before = is_steady and self._sphere is not None, self._sphere
-        is_drawn = is_kept and any(strands.are_bounds_pending for strands, _to_world in hair)
+        is_drawn = is_kept and any(strands.box.is_pending for strands, _to_world in hair)
         if is_drawn:
             draw()  # reading the bounds waits until the GPU has made the strands, and the last aim usually fits
         loose = drawing.bounding_sphere(hair)
         self._sphere = _steady(loose, before) if is_kept else loose
         if not (is_drawn and self._sphere is before):
             draw()
+
+    def contain(self, hair):
+        """Whether the maps contain hair, [(StrandsOnGPU, object to world)]."""
+        return self._sphere is not None and _is_within(drawing.bounding_sphere(hair), self._sphere)
 
     def _draw(self, lights, hair, surfaces, steps, casters, is_steady, chosen, counted):
         """`draw` with the maps aimed at the present sphere."""
@@ -310,10 +314,14 @@ class ShadowMaps:
 
 def _steady(sphere, before):
     """Return the sphere (center, radius) to aim maps at for hair within `sphere`; before: the previous sphere."""
-    apart = float(np.linalg.norm(sphere[0] - before[0]))
-    if apart + sphere[1] <= before[1] * (1.0 + 1e-6) and before[1] <= _LOOSEST * sphere[1]:
+    if _is_within(sphere, before) and before[1] <= _LOOSEST * sphere[1]:
         return before
     return sphere[0], _SPARE * sphere[1]
+
+
+def _is_within(sphere, other):
+    """Whether a sphere (center, radius) is within another."""
+    return float(np.linalg.norm(sphere[0] - other[0])) + sphere[1] <= other[1] * (1.0 + 1e-6)
 
 
 def _slot(texture, layer):

@@ -6,7 +6,6 @@ Points take eight bytes each: core/geometry/packed_strands.py.
 A change uploads all strands, or only the moved strands; a redraw uploads nothing.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,6 +16,7 @@ from ...core import geometry
 from ...core.shading.strand_looks import StrandLooks
 from . import driver_textures
 from .programs import shaders
+from .strand_box import StrandBox, known_box
 
 # Maximum width of textures; every driver supports 16384 texels.
 TEXTURE_WIDTH = 16384
@@ -58,7 +58,7 @@ class StrandsOnGPU:
     wetness_here: np.ndarray | None  # (S,) on the CPU
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
-    read_bounds: Callable[[], np.ndarray]  # returns `bounds`; may wait for the GPU
+    box: StrandBox  # in the coordinate system of the points
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
@@ -80,29 +80,24 @@ class StrandsOnGPU:
         return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
-    def bounds(self) -> np.ndarray:
-        """(2, 3): least and greatest coordinates; waits until the GPU has made the strands."""
-        return self.read_bounds()
-
-    @cached_property
     def shapes(self) -> dict:
-        """Cache of level_of_detail.py: {bytes of places: shapes}; empty for changed strands."""
+        """Cache of level_of_detail.py: {key of places: shapes}; empty for changed strands."""
         return {}
 
     @property
-    def are_bounds_pending(self) -> bool:
-        """Whether reading `bounds` may wait for the GPU."""
-        return self.is_made and "bounds" not in self.__dict__
-
-    @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
         """A center (3,), and the greatest distance of all points from it.
 
-        The distance of the corners of the bounds if only the GPU has the current points.
+        The distance of the corners of the likely box if only the GPU has the current points.
         """
-        centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
-        if not self.has_points:
-            return centre, 0.5 * float(np.linalg.norm(np.ptp(self.bounds, axis=0).astype(np.float64)))
+        if self.has_points:
+            return self._ball_of_points
+        likely = self.box.likely.astype(np.float64)
+        return 0.5 * likely.sum(axis=0), 0.5 * float(np.linalg.norm(np.ptp(likely, axis=0)))
+
+    @cached_property
+    def _ball_of_points(self):
+        centre = 0.5 * self.box.exact.sum(axis=0, dtype=np.float64)
         return centre, _farthest(self.points, centre)
 
     def lengthening(self, point_count: int) -> float:
@@ -139,7 +134,7 @@ def upload_strands(points, radii, randoms=None, wetness=None, looks=None):
         wetness,
         points,
         radii,
-        lambda: bounds,
+        known_box(bounds),
         _mean_length(points),
         float(radii[_some(strand_count)].mean()),
         float(radii.max()),
@@ -155,7 +150,7 @@ def with_points(strands, points):
         strands,
         texture=texture,
         points=points,
-        read_bounds=lambda: bounds,
+        box=known_box(bounds),
         mean_length=_mean_length(points),
         moved=None,
         is_made=False,
@@ -319,8 +314,8 @@ def move_strands(strands, moved, points):
     )
     packed = np.empty((len(moved), texel_count, 2), np.float32)
     low, high = geometry.packed_strands.pack(points, packed)
-    strands.bounds[0] = np.minimum(strands.bounds[0], low)
-    strands.bounds[1] = np.maximum(strands.bounds[1], high)
+    strands.box.exact[0] = np.minimum(strands.box.exact[0], low)
+    strands.box.exact[1] = np.maximum(strands.box.exact[1], high)
     texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
     texels[: len(moved), 0, 0] = moved  # exact in single precision up to 16 million
     texels[: len(moved), 1:] = packed

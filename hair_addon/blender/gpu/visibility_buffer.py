@@ -67,7 +67,7 @@ class _Placed:
     @property
     def total_length(self):
         """Length of all drawn segments seen from the side [samples]; infinite for hair around the viewer."""
-        records, bounds = self.records, self.batch.strands.bounds
+        records, bounds = self.records, self.batch.strands.box.likely
         middle = np.append(0.5 * bounds.sum(axis=0, dtype=np.float64), 1.0)
         depths = records["object_to_clip"].transpose(0, 2, 1)[:, 3] @ middle
         if (depths <= 0.0).any():

@@ -30,12 +30,12 @@ def of_boxes(bounds, to_clip, size, margin=1.0):
     return _around(clip, _are_in_front(clip), size, margin)
 
 
-def of_strands(strands, records, size):
+def of_strands(strands, records, size, bounds=None):
     """Return the windows (N, 4) of `StrandsOnGPU` at the places of (N,) `drawing.strand_records`.
 
-    size: of the picture [samples].
+    size: of the picture [samples]; bounds: (2, 3) of the strands, None for the loose box.
     """
-    clip = _corners_in_clip(strands.bounds, _to_clip(records))
+    clip = _corners_in_clip(strands.box.loose if bounds is None else bounds, _to_clip(records))
     half_width = np.maximum(_half_widths(strands, records, clip), 0.0)
     half_width = np.maximum(half_width, records["least_half_width"] * records["pixels_per_unit"])
     # A strip is up to √2 wider along an axis of the picture than across its own axis; samples are jittered.
@@ -47,7 +47,7 @@ def may_be_wide(strands, records, size, half_width):
     `of_strands`.
     """
     to_clip = _to_clip(records)
-    clip = _corners_in_clip(strands.bounds, to_clip)
+    clip = _corners_in_clip(strands.box.likely, to_clip)
     # `width_stretch` of shaders/visibility/segment.glsl at the picture's corner farthest from its axis.
     forward = np.where(records["is_perspective"][:, None] != 0, to_clip[:, 3, :3], [0.0, 0.0, 1.0])
     axis = (to_clip[:, :, :3] @ forward[..., None])[..., 0]

@@ -50,6 +50,7 @@ def read_shown(places, viewport, refused, shown, depsgraph):
     """Return (hair of a `DrawnScene`, the `HairPlace` of each) for all places whose hair can be drawn."""
     hair, drawn_places = [], []
     solid_hair.make_room(len(places))
+    hair_cache.read_boxes()
     for place in places:
         datablock = place.hair_object.data
         if viewport is not None and not datablock.vellus.is_drawn:

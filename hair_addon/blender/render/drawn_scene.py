@@ -52,6 +52,7 @@ class DrawnScene:
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
+    has_exact_boxes: bool = True  # whether shadow maps were drawn for the exact boxes of strands
     light: viewport_shading.ViewportLight = viewport_shading.SCENE_LIGHT
     is_wire: bool = False  # whether strands are thin lines
     is_shadowed: tuple = ()  # whether hair darkens each of `surfaces` in viewports; (): all of them
@@ -175,6 +176,10 @@ def read(
     are_made = _are_made(hair) or (has_played and bool(hair) and gpu_strands.are_wanted())
     last = before or (former if are_made else None)
     is_draft = is_draft or (former is not None and are_made)
+    # Only in a row of edits may the boxes of the hair before stand for those of hair that the GPU still makes.
+    if former is not None or not is_draft or last is None or last.renewal is None:
+        for strands, *_rest in hair:
+            strands.box.require()
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
     is_shadowed = ()
@@ -196,8 +201,19 @@ def read(
     maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     # Lights first: only their maps can be drawn without the bounds of strands, which the GPU may still be making.
     drawn = _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
+    are_exact = all(strands.box.is_exact for strands, *_rest in hair)
     (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
-    return replace(drawn, hair_visibility=hair_seen, surface_visibility=surfaces_seen, renewal=renewal)
+    seen = {"hair_visibility": hair_seen, "surface_visibility": surfaces_seen, "renewal": renewal}
+    return replace(drawn, **seen, has_exact_boxes=are_exact)
+
+
+def has_room(drawn):
+    """Whether the shadow maps of a `DrawnScene` contain its hair, by the exact boxes of hair."""
+    if drawn.has_exact_boxes:
+        return True
+    for strands, *_rest in drawn.hair:
+        strands.box.require()
+    return drawn.shadow_maps.contain(_placed(drawn.hair))
 
 
 def _surface_uids(places):

@@ -65,6 +65,16 @@ pose_cache = Cache()  # session_uid of a surface → Pose
 shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
+def read_boxes():
+    """Read the bounding boxes of strands that the GPU has made, of all hair that it is about to make again.
+
+    These boxes may stand for those of the next strands. The GPU has no other work yet, so this does not wait for long.
+    """
+    for cached in strand_cache.values():
+        if isinstance(cached, _CachedStrands) and cached.on_gpu is not None and cached.generator.due is not None:
+            _ = cached.on_gpu.box.exact
+
+
 @memory_as_sentence()
 def drawn_strands(datablock, is_viewport=True):
     """`StrandsOnGPU` of a hair Curves datablock; None if it was refused. Raises `HairError`.

@@ -16,6 +16,7 @@ from hair_addon.blender.gpu import (
     surface_textures,
 )
 from hair_addon.blender.gpu.programs import uniforms
+from hair_addon.blender.gpu.strand_box import StrandBox
 from hair_addon.core.errors import HairError
 
 
@@ -396,7 +397,7 @@ def test_maps_of_strands_that_the_gpu_makes_do_not_wait_for_their_bounds(scene, 
     for size, mirrored in ((1.0, 1), (1.2, 1), (1.21, -1), (1.9, 1), (1.95, 1), (0.4, 1)):
         to_world = np.diag([0.01, 0.02 * mirrored, 0.01, 1.0])
         known = strand_textures.upload_strands(points * np.float32(size), radii)
-        made = replace(known, is_made=True, read_bounds=partial(read, known.bounds))
+        made = replace(known, is_made=True, box=StrandBox(partial(read, known.box.known)))
         records = []
         for maps, strands in ((knows, known), (waits, made)):
             events.clear()

@@ -11,7 +11,7 @@ import pytest
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, shadows, strand_textures, surface_textures
 from hair_addon.blender.gpu.programs import shaders
-from hair_addon.blender.gpu.strands import device_choice, strand_maker
+from hair_addon.blender.gpu.strands import device_choice, strand_bounds, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
@@ -74,7 +74,7 @@ def test_bounds_are_those_of_what_is_shown(watched):
     for along in (0.3, 0.3, -0.6):  # out of the first ones, and back
         comb(60, along=(along, 0.0, 0.0))
         shown = drawn(watched).reshape(-1, 3)
-        bounds = hair_cache.strands_on_gpu(watched.data).bounds
+        bounds = hair_cache.strands_on_gpu(watched.data).box.exact
         np.testing.assert_allclose(bounds, [shown.min(axis=0), shown.max(axis=0)], rtol=0.0, atol=2e-6)
     assert first.texture is hair_cache.strands_on_gpu(watched.data).texture
 
@@ -217,6 +217,54 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, monkeypatch):
     bpy.context.view_layer.update()
     view()
     assert counted[-1] is None  # at rest maps count all strands
+
+
+def test_a_row_of_edits_does_not_wait_for_its_own_strands(hair, window, monkeypatch):
+    """In a row of edits each frame reads the box of the former strands before the GPU makes new ones, and no other.
+
+    Strands that leave the maps are in them with the next redraw, and at rest all boxes are exact.
+    """
+    viewport.view_cache.clear()
+    events, read, make = [], strand_bounds.StrandBounds._read, strand_maker.StrandMaker.make
+    monkeypatch.setattr(strand_bounds.StrandBounds, "_read", lambda *given: events.append("read") or read(*given))
+    monkeypatch.setattr(strand_maker.StrandMaker, "make", lambda *given: events.append("made") or make(*given))
+
+    def view():
+        return viewport.drawn_scene_of(context_of(view3d()))
+
+    def edit(along):
+        events.clear()
+        comb(20, along)
+        return view()
+
+    view()
+    edit((0.0, 0.01, 0.0))  # binds the hair
+    prepare()
+    assert edit((0.0, 0.01, 0.0)).hair[0][0].box.is_exact  # a single edit
+    for turn in range(3):
+        found = edit((0.0, 0.01, 0.0))
+        assert events == (["read", "made"] if turn else ["made"]), turn
+        assert not found.hair[0][0].box.is_exact
+        assert found.shadow_maps.contain(drawn_scene._placed(found.hair))
+    events.clear()
+    assert view() is found
+    assert view() is found
+    assert found.hair[0][0].box.is_exact
+    assert events == ["read"]
+
+    edit((0.0, 0.01, 0.0))
+    found = edit((0.0, 0.0, 3.0))
+    seen = found.hair[0][0].box
+    assert not seen.is_exact
+    assert np.ptp(seen.exact, axis=0)[2] > 1.5 * np.ptp(seen.former, axis=0)[2]
+    fitting = view()
+    assert fitting is not found
+    assert fitting.shadow_maps.contain(drawn_scene._placed(fitting.hair))
+    assert view() is fitting
+    edit((0.0, 0.0, -3.0))
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    assert view().hair[0][0].box.is_exact
 
 
 def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, monkeypatch):

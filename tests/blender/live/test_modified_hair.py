@@ -101,7 +101,7 @@ def test_moved_points_are_all_that_is_uploaded(modified):
     fresh = strand_textures.upload_strands(moved.points, moved.radii, moved.randoms_here, moved.wetness_here)
     np.testing.assert_array_equal(np.array(moved.texture.read()), np.array(fresh.texture.read()))
     assert moved.mean_length == fresh.mean_length
-    np.testing.assert_array_equal(moved.bounds, fresh.bounds)
+    np.testing.assert_array_equal(moved.box.exact, fresh.box.exact)
     modified.data.vellus.hair.radius *= 2.0
     assert is_evaluated(modified).shape == moved.points.shape
     wider = modified_hair.modified_cache.get(modified.session_uid).on_gpu

@@ -218,4 +218,4 @@ def test_hair_of_a_linked_collection_is_drawn(creature, tmp_path):
     assert places(drawn) == [(2.0, 0.0, 0.0)]
     strands = drawn.hair[0][0]
     assert (strands.strand_count, strands.point_count) == expected.shape[:2]
-    np.testing.assert_allclose(strands.bounds[1] - strands.bounds[0], np.ptp(expected, axis=(0, 1)), atol=1e-4)
+    np.testing.assert_allclose(strands.box.exact[1] - strands.box.exact[0], np.ptp(expected, axis=(0, 1)), atol=1e-4)

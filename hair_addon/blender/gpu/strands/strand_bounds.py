@@ -4,9 +4,7 @@
 Compute programs of every backend support it: neither atomics nor shared memory is needed.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import gpu
@@ -14,6 +12,7 @@ import numpy as np
 
 from .. import driver_textures
 from ..programs import shaders
+from ..strand_box import StrandBox
 from ..strand_textures import TEXTURE_WIDTH
 
 _GROUP_SIZE = 64
@@ -35,11 +34,10 @@ class StrandBounds:
         """Texture of the box of each strand: two texels each, with as many per row as fit."""
         return self.levels[0][0]
 
-    def joined(self) -> Callable[[], np.ndarray]:
-        """Join the boxes of strands; returns a function that returns the result.
+    def joined(self, former: np.ndarray | None = None) -> StrandBox:
+        """Join the boxes of strands; returns the `StrandBox` of the result.
 
-        The result, (2, 3) float32 least and greatest coordinates, is read by the first call, which waits until the
-        strands are made.
+        former: (2, 3) box of the strands before they changed, None: unknown.
         """
         program = _join_program()
         program.bind()
@@ -51,7 +49,7 @@ class StrandBounds:
             program.uniform_int("joined_count", joined_count)
             gpu.compute.dispatch(program, -(-joined_count // _GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
-        return cache(self._read)
+        return StrandBox(self._read, former=former)
 
     def _read(self):
         return np.array(self.levels[-1][0].read(), np.float32).reshape(_BOX, 4)[:, :3]

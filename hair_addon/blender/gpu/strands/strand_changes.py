@@ -39,10 +39,10 @@ class StrandChanges:
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """Return `strands` as the program leaves them, with exact bounds.
+        """Return `strands` as the program leaves them.
 
-        The first use of the bounds reads them, and waits until the program has run. So the GPU runs the programs of all
-        hair while the CPU reads the rest of the scene.
+        The first use of the exact box reads it, and waits until the program has run. So the GPU runs the programs of
+        all hair while the CPU reads the rest of the scene.
         """
         before = strands.moved.turn if strands.moved else 0
         if self.row_moved:
@@ -51,7 +51,7 @@ class StrandChanges:
             # Former points are unknown: counted like more than one change.
             moved = Moved(self.moved, 1, self.moved_rows, before + 2)
         flags = {"is_made": True, "has_points": False, "has_bends": False}
-        return replace(strands, moved=moved, read_bounds=self.bounds.joined(), **flags)
+        return replace(strands, moved=moved, box=self.bounds.joined(strands.box.known), **flags)
 
 
 def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:

@@ -62,6 +62,18 @@ def of_hair(drawn, camera, size, per_side, is_shadowed=False):
     camera: (world to view, view to clip), each (4, 4); per_side: minimum samples along each side of a pixel;
     is_shadowed: contain the surfaces that hair darkens too.
     """
+    found = _of_likely_boxes(drawn, camera, size, per_side, is_shadowed)
+    guessed = [strands.box for strands, *_ in drawn.hair if not strands.box.is_exact]
+    if found.per_side == per_side or not guessed:
+        return found
+    # Hair outside of the part that has finer samples would not be drawn.
+    for box in guessed:
+        box.require()
+    return _of_likely_boxes(drawn, camera, size, per_side, is_shadowed)
+
+
+def _of_likely_boxes(drawn, camera, size, per_side, is_shadowed):
+    """`of_hair` for the likely boxes of strands."""
     most = min(_WANTED_SAMPLES, _LARGEST_PART * size[0] * size[1] * per_side**2)
     low, high, finer = np.array(size), np.zeros(2, int), 0
     for found in _windows(drawn, camera, size, is_shadowed):
@@ -84,7 +96,7 @@ def _windows(drawn, camera, size, is_shadowed):
     view = drawing.pass_record(*camera, size)
     for batch in drawn.batches:
         records = drawing.strand_records(batch.strands, view, batch.to_world)
-        yield windows.of_strands(batch.strands, records, size)
+        yield windows.of_strands(batch.strands, records, size, batch.strands.box.likely)
     if is_shadowed:
         for surface, _lights, _seen, is_darkened in drawn.shadowed:
             if is_darkened:

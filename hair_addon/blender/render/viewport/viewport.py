@@ -187,7 +187,8 @@ def drawn_scene_of(context):
     if view is None or view.shows != shows:  # settings of a viewport do not change the scene
         view = view_cache.keep(key, _View(shows))
     is_playing = scene_time.is_playing() or hidden_hair.is_any_paused()
-    if view.is_playing and not is_playing and view.drawn is not None:  # read again in full detail at rest
+    is_rough = view.is_playing and not is_playing  # at rest the scene is read again in full detail
+    if view.drawn is not None and (is_rough or not drawn_scene.has_room(view.drawn)):
         view.outdated, view.drawn = view.drawn, None
         view.lit.clear()
     if view.drawn is None:

@@ -73,7 +73,7 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
         assert 0.1 < is_still.mean() < 0.9
         np.testing.assert_array_equal(found[is_still], drawn_strands.places(uploaded(points))[is_still])
         corners = found.reshape(-1, 3)
-        np.testing.assert_allclose(strands.bounds, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=CLOSE)
+        np.testing.assert_allclose(strands.box.exact, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=CLOSE)
 
 
 def test_strands_that_begin_apart_from_their_places_are_carried_to_these(blender, rooted):

@@ -106,7 +106,7 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
     # Places of 1 m have half a unit of their last digit beside it, twice.
     assert (error <= CLOSE * lengths + 4.0 * 2.0**-23).all(), error.max()
     places, close = found.reshape(-1, 3), drawn_strands.tolerance(found).max()
-    np.testing.assert_allclose(made.bounds, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=close)
+    np.testing.assert_allclose(made.box.exact, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=close)
     centre, radius = made.ball
     assert (np.linalg.norm(places - centre, axis=1) <= radius * (1.0 + 1e-6)).all()
 
@@ -118,7 +118,7 @@ def test_joined_boxes_hold_all_boxes(blender, rng, count):
     boxes = rng.normal(size=(-(-count // in_row) * in_row, 2, 4)).astype(np.float32)
     texels = gpu.types.Buffer("FLOAT", boxes.size, boxes.ravel())
     texture = gpu.types.GPUTexture((2 * in_row, len(boxes) // in_row), format="RGBA32F", data=texels)
-    found = replace(bounds, levels=((texture, count), *bounds.levels[1:])).joined()()
+    found = replace(bounds, levels=((texture, count), *bounds.levels[1:])).joined().exact
     np.testing.assert_array_equal(found, [boxes[:count, 0, :3].min(axis=0), boxes[:count, 1, :3].max(axis=0)])
 
 
@@ -182,7 +182,7 @@ def test_bounds_are_read_once_they_are_needed(blender, rng, monkeypatch):
     assert not reads
     places = drawn_strands.places(made).reshape(-1, 3)
     for shown in (again, made):
-        np.testing.assert_allclose(shown.bounds, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=1e-4)
+        np.testing.assert_allclose(shown.box.exact, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=1e-4)
     assert len(reads) == 1
 
 

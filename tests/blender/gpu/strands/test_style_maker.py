@@ -69,7 +69,7 @@ def made(maker, hair, styling, strands):
     on_gpu = maker.make(strands, styling.guides(hair.guides).numpy())
     points = drawn_strands.places(on_gpu)
     corners, close = points.reshape(-1, 3), drawn_strands.tolerance(points).max()
-    np.testing.assert_allclose(on_gpu.bounds, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=close)
+    np.testing.assert_allclose(on_gpu.box.exact, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=close)
     return points
 
 
