@@ -63,7 +63,7 @@ def of_hair(drawn, camera, size, per_side, is_shadowed=False):
     is_shadowed: contain the surfaces that hair darkens too.
     """
     found = _of_likely_boxes(drawn, camera, size, per_side, is_shadowed)
-    guessed = [strands.box for strands, *_ in drawn.hair if not strands.box.is_exact]
+    guessed = [batch.strands.box for batch in drawn.batches if not batch.strands.box.is_exact]
     if found.per_side == per_side or not guessed:
         return found
     # Hair outside of the part that has finer samples would not be drawn.
