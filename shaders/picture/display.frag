@@ -17,7 +17,11 @@ float depth_at(ivec2 pixel)
 
 void main()
 {
-  ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
+  vec2 place = gl_FragCoord.xy - origin;
+  if (any(lessThan(place, border.xy)) || any(greaterThan(place, border.zw))) {
+    discard;
+  }
+  ivec2 pixel = ivec2(place);
   vec4 light = texelFetch(passes, pixel, 0);
   if (first_part > 0.0) {
     light = mix(light, float(pass_count) * texelFetch(first_picture, pixel, 0), first_part);

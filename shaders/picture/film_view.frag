@@ -3,5 +3,9 @@
 
 void main()
 {
-  color = max(texelFetch(sums, ivec2(gl_FragCoord.xy - origin), 0) / weight_sum, vec4(0.0));
+  vec2 place = gl_FragCoord.xy - origin;
+  if (any(lessThan(place, border.xy)) || any(greaterThan(place, border.zw))) {
+    discard;
+  }
+  color = max(texelFetch(sums, ivec2(place), 0) / weight_sum, vec4(0.0));
 }

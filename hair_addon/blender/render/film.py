@@ -169,14 +169,18 @@ class Film:
         """(texture, weight): the weighted sum of all passes' samples of "Combined", and the sum of weights."""
         return self._sums["Combined"], self._weight_sum
 
-    def show(self, picture=None):
-        """Draw the mean of the samples, or another picture of this size, over the bound viewport."""
+    def show(self, picture=None, border=None):
+        """Draw the mean of the samples, or another picture of this size, over the bound viewport.
+
+        border: (left, bottom, right, top) [pixels], outside of which nothing is drawn.
+        """
         program = picture_programs.film_view_program()
         x, y, _width, _height = gpu.state.viewport_get()
         with (
             drawing.bound(program, {}, {"sums": picture or self._sums["Combined"]}),
             drawing.gpu_state("NONE", False, "ALPHA_PREMULT"),
         ):
+            program.uniform_float("border", (0.0, 0.0, *self.size) if border is None else border)
             program.uniform_float("origin", (x, y))
             program.uniform_float("weight_sum", 1.0 if picture else self._weight_sum)
             drawing.cover(program)

@@ -130,7 +130,7 @@ def test_a_rendered_viewport_blurs_only_through_the_camera(lit, tmp_path, monkey
     context = SimpleNamespace(
         scene=blender_scene,
         evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
-        space_data=SimpleNamespace(use_local_camera=False),
+        space_data=SimpleNamespace(use_local_camera=False, use_render_border=False),
         region=SimpleNamespace(width=width, height=height, as_pointer=lambda: 1),
         region_data=SimpleNamespace(view_perspective="CAMERA" if through_camera else "PERSP", **matrices),
     )

@@ -117,6 +117,7 @@ def strand_data_program():
 def film_view_program():
     """Return the program that shows the mean of a film: see picture/film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC4", "border")  # left, bottom, right and top of what is shown of the film [pixels]
     info.push_constant("VEC2", "origin")  # [pixels] of the film in the framebuffer
     info.push_constant("FLOAT", "weight_sum")
     info.sampler(0, "FLOAT_2D", "sums")

@@ -311,6 +311,7 @@ def first_picture_program():
 def display_program():
     """Return the program that shows hair over a viewport: see picture/display.frag."""
     info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC4", "border")  # left, bottom, right and top of what is shown of the picture [pixels]
     info.push_constant("VEC2", "origin")  # of the picture in the framebuffer [pixels]
     info.push_constant("FLOAT", "exposure")
     info.push_constant("FLOAT", "opacity")

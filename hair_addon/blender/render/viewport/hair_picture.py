@@ -159,15 +159,16 @@ class HairPicture:
             return 0.0
         return _FIRST_PARTS[self.pass_count - 1]
 
-    def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
+    def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL", border=None):
         """Draw the picture over the bound viewport.
 
         display_table: texture of a `DisplayTransform`'s table; exposure: factor of light; depth_test: against the
-        viewport's depth.
+        viewport's depth; border: (left, bottom, right, top) [pixels], outside of which nothing is drawn.
         """
         program = scene_programs.display_program()
         x, y, _width, _height = gpu.state.viewport_get()
         program.bind()
+        program.uniform_float("border", (0.0, 0.0, *self.size) if border is None else border)
         program.uniform_float("origin", (x, y))
         program.uniform_float("exposure", exposure)
         program.uniform_float("opacity", opacity)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Viewports with Rendered shading: surfaces and hair, refined pass by pass while nothing moves."""
 
-from ...data.pictures import cameras
+from ...data.pictures import cameras, render_regions
 from ...gpu import drawing
 from . import hair_picture, live_light, region_pictures, viewport
 from .view_film import ViewFilm
@@ -21,7 +21,7 @@ def draw(context):
             film.restart(is_moved=True)
         if not film.is_fine:
             film.add_pass(drawn, *camera, lens)
-        film.show()
+        film.show(render_regions.read(context.space_data, context.region, context.region_data, context.scene))
         return not film.is_fine and not live_light.is_next(context, film.pass_count)
 
 

@@ -55,9 +55,9 @@ class ViewFilm:
         samples = film.samples, self._detail
         self._history.add(drawn, camera, view, samples, film.light, film.pass_count, part_left, has_lit_surfaces=True)
 
-    def show(self):
-        """Draw the picture over the bound viewport."""
-        self._film.show(self._history.picture)
+    def show(self, border=None):
+        """Draw the picture over the bound viewport; border: as for `Film.show`."""
+        self._film.show(self._history.picture, border)
 
     def read(self):
         """Return (height, width, 4) float32: the mean of the passes so far, bottom row first."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ....core.errors import HairError
 from ...data import scene
-from ...data.pictures import viewport_shading
+from ...data.pictures import render_regions, viewport_shading
 from ...data.strands import curves_objects
 from ...gpu import drawing
 from ...gpu.display_transform import DisplayTransform
@@ -121,6 +121,7 @@ def _draw_hair(context):
         2.0**context.scene.view_settings.exposure if management == viewport_shading.ALL else 1.0,
         1.0 if xray is None else xray,
         "LESS_EQUAL" if viewport.overlay.show_overlays and xray is None else "ALWAYS",
+        _border(context),
     )
     if region_picture.outline is not None:
         region_picture.outline.show()
@@ -297,6 +298,13 @@ def _clip_planes(context):
         return None
     planes = tuple(map(tuple, view.clip_planes))
     return (*planes[:4], *[(0.0, 0.0, 0.0, 0.0)] * 2) if view.use_box_clip else planes  # quad views clip by four planes
+
+
+def _border(context):
+    """Return the Render Region that Material Preview is limited to, as `render_regions.read`, or None."""
+    if context.space_data.shading.type != "MATERIAL":
+        return None
+    return render_regions.read(context.space_data, context.region, context.region_data, context.scene)
 
 
 def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False, clip_planes=None):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's Clipping Region clips hair, its outline, its guides and picking."""
+"""Blender's Clipping Region clips hair, its outline, its guides and picking; its Render Region limits the picture."""
 
 from types import SimpleNamespace
 
@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.gpu import drawing
+from hair_addon.blender.gpu import display_transform, drawing
 from hair_addon.blender.render import drawn_scene
-from hair_addon.blender.render.viewport import guide_lines, region_pictures, selected_hair, viewport
+from hair_addon.blender.render.viewport import (
+    guide_lines,
+    hair_picture,
+    region_pictures,
+    selected_hair,
+    view_film,
+    viewport,
+)
 
 SIZE = 96
 NONE = (0.0, 0.0, 0.0, 0.0)
@@ -120,3 +127,61 @@ def test_it_cuts_off_where_blender_does(space, shading):
     assert np.allclose(found, RIGHT) if is_clipped else found is None
     space.region_3d.use_clip_planes = False
     assert viewport._clip_planes(context) is None
+
+
+def shown_by(show, borders):
+    """Return what a function of a border draws over nothing, for each border: [(SIZE, SIZE) alpha]."""
+    texture = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    target, shown = gpu.types.GPUFrameBuffer(color_slots=texture), []
+    with target.bind():
+        for border in borders:
+            target.clear(color=NONE)
+            show(border)
+            shown.append(np.array(target.read_color(0, 0, SIZE, SIZE, 4, 0, "FLOAT"))[..., 3])
+    return shown
+
+
+def test_material_preview_and_our_engine_draw_in_the_render_region_only(space, region):
+    """Hair outside would float there, as EEVEE shows no surfaces outside of the region."""
+    space.region_3d.use_clip_planes, (place, view) = False, region
+    picture = viewport._picture(read(), view, place, False).picture
+    context = SimpleNamespace(
+        space_data=space, region=place, region_data=view, scene=bpy.context.scene, view_layer=bpy.context.view_layer
+    )
+    view.view_perspective, space.use_render_border = "PERSP", True
+    space.render_border_min_x, space.render_border_max_x = 0.25, 0.75
+    space.render_border_min_y, space.render_border_max_y = 0.5, 1.0
+    borders = {}
+    for space.shading.type in ("SOLID", "MATERIAL"):
+        borders[space.shading.type] = viewport._border(context)
+    space.use_render_border = False
+    assert borders == {"SOLID": None, "MATERIAL": (24.0, 48.0, 72.0, 96.0)} and viewport._border(context) is None
+    table = hair_picture.table_texture(display_transform.DisplayTransform.of(bpy.context.scene).table())
+    film = view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
+    film.add_pass(read(), *matrices())
+    for show in (lambda border: picture.show(table, 1.0, depth_test="NONE", border=border), film.show):
+        whole, part = shown_by(show, (None, borders["MATERIAL"]))
+        expected = np.zeros_like(whole)
+        expected[48:, 24:72] = whole[48:, 24:72]
+        assert expected.any() and (whole > 0.0).sum() > 2 * (expected > 0.0).sum()
+        np.testing.assert_array_equal(part, expected)
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_in_camera_view_the_render_region_is_that_of_the_scene(space, region, kind):
+    """It is relative to the frame of the camera, which may be smaller than the viewport."""
+    blender_scene, (place, view) = bpy.context.scene, region
+    render, camera = blender_scene.render, blender_scene.camera
+    camera.data.type, camera.scale, camera.data.shift_x = kind, (2.0, 2.0, 2.0), 0.1
+    render.resolution_x, render.resolution_y = 200, 200
+    bpy.context.view_layer.update()
+    world_to_view, view_to_clip = matrices()
+    space.shading.type, view.view_perspective = "MATERIAL", "CAMERA"
+    context = SimpleNamespace(space_data=space, region=place, region_data=view, scene=blender_scene)
+    assert viewport._border(context) is None
+    render.use_border, render.border_min_x, render.border_max_x = True, 0.25, 0.5
+    render.border_min_y, render.border_max_y = 0.0, 0.75
+    for part in (1.0, 0.5):
+        view.view_matrix, view.window_matrix = world_to_view, np.diag([part, part, 1.0, 1.0]) @ view_to_clip
+        expected = SIZE * (0.5 + part * (np.array([0.25, 0.0, 0.5, 0.75]) - 0.5))
+        np.testing.assert_allclose(viewport._border(context), expected, atol=0.01)
