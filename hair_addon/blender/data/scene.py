@@ -2,6 +2,7 @@
 """Surfaces and cameras: Blender's data → arrays."""
 
 from contextlib import contextmanager
+from dataclasses import replace
 
 import bmesh
 import bpy
@@ -38,8 +39,12 @@ def require_scale(surface_object):
         raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
 
 
-def read_surface(surface_object, depsgraph):
-    """Return the evaluated mesh of an object as a `Surface`. Raises `HairError`, also for None, a deleted surface."""
+def read_surface(surface_object, depsgraph, has_uvs=True):
+    """Return the evaluated mesh of an object as a `Surface`. Raises `HairError`, also for None, a deleted surface.
+
+    has_uvs: whether UVs are needed; else the surface may have none. They take as long to read and to compare as the
+    rest of a pose.
+    """
     if surface_object is None:
         raise HairError("The surface is missing: pick a mesh.")
     if surface_object.type != "MESH":  # a script may have set it as the surface of Curves
@@ -54,7 +59,10 @@ def read_surface(surface_object, depsgraph):
         posed = cached_positions(surface_object, mesh)
         rest = _rest_positions(mesh, posed)
         faces = cached_faces(surface_object, mesh)
-        uv_map, loop_uvs = _loop_uvs(mesh)
+        if has_uvs or known is None:
+            uv_map, loop_uvs = _loop_uvs(mesh)
+        else:
+            uv_map, loop_uvs = known[0].uv_map, known[0].loop_uvs
         is_turned = surface_space.is_turned(surface_object)
         is_divided = rest is not posed and subdivided_surfaces.is_divided(surface_object)
         read = Reading(
@@ -67,6 +75,9 @@ def read_surface(surface_object, depsgraph):
                 # The triangulation of polygons depends on vertex positions, and must be the same in every pose. Writing
                 # to the attribute instead would not update triangles that Blender shares with the evaluated mesh.
                 mesh.vertices.foreach_set("co", rest.ravel())
+            if known is not None and not has_uvs:
+                uv_map, loop_uvs = _loop_uvs(mesh)
+                read = replace(read, uv_map=uv_map, loop_uvs=loop_uvs)
             corners = triangle_corners(mesh, faces, read.name)
             if is_turned:
                 corners = surface_readings.turned_back(corners, faces, undivided)
@@ -77,8 +88,10 @@ def read_surface(surface_object, depsgraph):
     if read.has_rest and np.isfinite(rest).all():
         cage_corners = subdivided_surfaces.cage_corners(surface_object, depsgraph, faces)
     if known is not None and known[1].cage_corners == cage_corners:
-        return known[1].posed_at(posed if read.has_rest else known[1].rest)
+        return known[1].posed_at(posed if read.has_rest else known[1].rest, has_uvs)
     if known is not None:
+        if not has_uvs:
+            return read_surface(surface_object, depsgraph)
         corners = known[2]
     own = _own_mesh(surface_object, uv_map) if is_divided else None
     surface = surface_readings.surface_of(read, posed, corners, cage_corners, undivided, own)

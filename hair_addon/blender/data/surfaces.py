@@ -124,9 +124,9 @@ class Surface:
         factor = np.float32(np.sqrt(areas[0] / areas[1]))
         return self.cage if 1.0 / _RESIZED < factor < _RESIZED else self.cage.posed_at(factor * self.cage.rest)
 
-    def posed_at(self, posed):
-        """Return a copy of the surface with its vertices at (V, 3) float32 local positions."""
-        other = replace(self, posed=posed)
+    def posed_at(self, posed, has_uvs=True):
+        """Return a copy of the surface with its vertices at (V, 3) float32 local positions; has_uvs: keep its UVs."""
+        other = replace(self, posed=posed) if has_uvs else replace(self, posed=posed, corner_uvs=None)
         known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
         other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # shared by all poses
         return other

@@ -162,8 +162,11 @@ def _pose_of(surface_object):
     """Return the `Pose` of a surface, None without a surface. Raises `HairError`."""
     if surface_object is None:
         return None
-    depsgraph = bpy.context.evaluated_depsgraph_get
-    return pose_cache.get(surface_object.session_uid, lambda: posed_strands.read_pose(surface_object, depsgraph()))
+
+    def read():
+        return posed_strands.read_pose(surface_object, bpy.context.evaluated_depsgraph_get(), has_uvs=False)
+
+    return pose_cache.get(surface_object.session_uid, read)
 
 
 def drawn_bytes(datablock):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces and meshes that are read again reuse unchanged data, with the same result as a first reading."""
 
+from dataclasses import replace
+
 import bmesh
 import bpy
 import numpy as np
@@ -116,6 +118,22 @@ def test_surfaces_are_as_if_read_for_the_first_time(ball):
         scene.surface_cache.clear()
         scene.faces_cache.clear()
         assert same_surfaces(again, scene.read_surface(ball, depsgraph)), change.__name__
+
+
+def test_poses_without_uvs_follow_all_other_changes(ball):
+    """Surfaces that are read without UVs have all other changes, and no UVs of before; later readings have the UVs."""
+    for change in CHANGES:
+        scene.read_surface(ball, depsgraph_of(ball))
+        change(ball)
+        depsgraph = depsgraph_of(ball)
+        bare, again = scene.read_surface(ball, depsgraph, False), scene.read_surface(ball, depsgraph)
+        scene.surface_cache.clear()
+        scene.faces_cache.clear()
+        new = scene.read_surface(ball, depsgraph)
+        assert bare.corner_uvs is None or np.array_equal(bare.corner_uvs, new.corner_uvs), change.__name__
+        assert same_surfaces(again, new), change.__name__
+        bare, new = (replace(one, corner_uvs=None, uv_map="") for one in (bare, new))
+        assert same_surfaces(bare, new), change.__name__
 
 
 def test_meshes_that_move_are_drawn_as_if_read_for_the_first_time(ball):

@@ -94,11 +94,13 @@ class Pose:
         return vertices, barycentric, at_rest - firsts
 
 
-def read_pose(surface_object, depsgraph):
-    """Return the `Pose` of a surface in a depsgraph; at rest if it is None or not a mesh."""
+def read_pose(surface_object, depsgraph, has_uvs=True):
+    """Return the `Pose` of a surface in a depsgraph; at rest if it is None or not a mesh; has_uvs: as for
+    `scene.read_surface`.
+    """
     if surface_object is None or surface_object.type != "MESH":
         return Pose(None)
-    return pose_of(scene.read_surface(surface_object, depsgraph))
+    return pose_of(scene.read_surface(surface_object, depsgraph, has_uvs))
 
 
 def pose_of(surface):
