@@ -233,6 +233,60 @@ def _list(
         out_keys[at + number] = int(_hashed(wp.uint64(segment), wp.uint64(number), seed))
 
 
+@wp.func
+def _spread_bits(value: int):
+    """Return the lowest ten bits of a number with two zeros between each two."""
+    bits = value & 1023
+    bits = (bits | (bits << 16)) & 0x030000FF
+    bits = (bits | (bits << 8)) & 0x0300F00F
+    bits = (bits | (bits << 4)) & 0x030C30C3
+    return (bits | (bits << 2)) & 0x09249249
+
+
+@wp.kernel
+def _code(
+    points: wp.array[wp.vec3],
+    corner: wp.vec3,
+    voxel: float,
+    shape: wp.vec3i,
+    segments: wp.array[int],
+    out_codes: wp.array[int],
+    out_order: wp.array[int],
+):
+    """Compute the place of each segment's voxel along a curve through nearby voxels [Morton66]."""
+    place = wp.tid()
+    at = voxel_at(points[segments[place]], corner, voxel, shape)
+    out_codes[place] = _spread_bits(at[0]) | (_spread_bits(at[1]) << 1) | (_spread_bits(at[2]) << 2)
+    out_order[place] = place
+
+
+@wp.kernel
+def _take(
+    order: wp.array[int],
+    segments: wp.array[int],
+    keys: wp.array[int],
+    out_segments: wp.array[int],
+    out_keys: wp.array[int],
+):
+    place = wp.tid()
+    out_segments[place] = segments[order[place]]
+    out_keys[place] = keys[order[place]]
+
+
+def _by_voxels(medium, segments, keys):
+    """Return segments (N,) and keys (N,) in the order of nearby voxels, whose rays read the same memory."""
+    count, device = len(segments), segments.device
+    codes, order = (wp.empty(2 * count, dtype=int, device=device) for _ in range(2))
+    found = wp.empty_like(segments), wp.empty_like(keys)
+    if count:
+        given = [medium.points, medium.corner, medium.voxel, medium.shape, segments]
+        kernel_cache.launch(_code, count, given, [codes, order], device)
+        most = 3 * max(int(side) - 1 for side in medium.shape).bit_length()
+        wp.utils.radix_sort_pairs(codes, order, count, end_bit=max(most, 1))
+        kernel_cache.launch(_take, count, [order, segments, keys], found, device)
+    return found
+
+
 @wp.kernel
 def _keep(
     segments: wp.array[int],
@@ -274,6 +328,7 @@ def of_seen(
         ends, tries = running_sums.ends_of(counts)
         segments, keys, in_sight = (wp.zeros(tries, dtype=int) for _ in range(3))
         launch(_list, len(counts), [counts, ends, _product(seed + 1), segments, keys], device)
+        segments, keys = _by_voxels(medium, segments, keys)
         launch(_see, tries, [medium, seen_in, segments, keys, in_sight], device)
         ends, found = running_sums.ends_of(in_sight)
         starts = Starts(wp.empty(found, dtype=int), wp.empty(found, dtype=int), wp.empty(found, dtype=float))
