@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cumulative opacity per layer from the counts of shadows/strand_shadow.comp. Also clears the images for the next map, which
+// Cumulative opacity per layer from the counts of shadows/strand_shadow.comp. Also clears the images for the next maps, which
 // takes drivers longer.
 
 #include "shadows/opacity.glsl"
@@ -10,6 +10,12 @@ void main()
   if (any(greaterThanEqual(here, imageSize(fronts)))) {
     return;
   }
+  int size = imageSize(fronts).x;
+  int turn = here.y / size;
+  int layer = shadow_views.view[turn].light_index;
+  if (layer < 0) {
+    return;
+  }
   float sum = 0.0;
   vec4 found;
   for (int part = 0; part < 4; part++) {
@@ -18,7 +24,7 @@ void main()
     found[part] = sum;
     imageStore(counts, place, uvec4(0u));
   }
-  imageStore(filtered, ivec3(here, layer), found);
+  imageStore(filtered, ivec3(here.x, here.y - turn * size, layer), found);
   imageStore(fronts, here, uvec4(front_bits(FAR)));
   imageStore(backs, here, uvec4(0u));
 }

@@ -8,7 +8,7 @@ void main()
   Light light = lights.light[view.light_index];
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
   // Strands occluded by surfaces do not affect the layers' depths.
-  if (depth > texelFetch(hidden_depth, ivec2(gl_FragCoord.xy), 0).r) {
+  if (depth > texelFetch(hidden_depth, ivec3(ivec2(gl_FragCoord.xy), light.shadow_layer), 0).r) {
     discard;
   }
   front = front_bits(depth);

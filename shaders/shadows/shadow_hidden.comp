@@ -16,5 +16,5 @@ void main()
       hidden = max(hidden, texelFetch(surface_depth, ivec3(clamp(here + ivec2(x, y), ivec2(0), last), 0), 0).r);
     }
   }
-  imageStore(filtered, here, vec4(hidden + SURFACE_BIAS));
+  imageStore(filtered, ivec3(here, layer), vec4(hidden + SURFACE_BIAS));
 }

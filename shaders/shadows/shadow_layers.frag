@@ -9,6 +9,6 @@ void main()
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
   ivec2 here = ivec2(gl_FragCoord.xy);
   vec2 ends = texelFetch(hair_front, ivec3(here, light.shadow_layer), 0).rg;
-  int layer = layer_among(depth, ends, texelFetch(hidden_depth, here, 0).r);
+  int layer = layer_among(depth, ends, texelFetch(hidden_depth, ivec3(here, light.shadow_layer), 0).r);
   color = vec4(lessThan(vec4(float(layer)), vec4(0.5, 1.5, 2.5, 3.5))) * strand_coverage;
 }

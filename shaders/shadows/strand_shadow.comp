@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rasterizes strands into a deep opacity map: first the nearest and farthest depths (IS_FRONT), then the counts of each layer
-// in between.
+// Rasterizes strands into the deep opacity maps of several lights: first the nearest and farthest depths (IS_FRONT), then the
+// counts of each layer in between. The images of maps that are drawn together are stacked.
 
 #include "shadows/opacity.glsl"
 #include "visibility/segment.glsl"
@@ -32,10 +32,12 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
   return false;
 }
 
-void meet(ivec2 place, float along, float across, float coverage)
+void meet(ivec2 seen_place, float along, float across, float coverage)
 {
   float depth = mix(end_depths.x, end_depths.y, clamp(along, 0.0, 1.0));
-  float hidden = texelFetch(hidden_depth, place, 0).r;
+  int shadow_layer = lights.light[view.light_index].shadow_layer;
+  float hidden = texelFetch(hidden_depth, ivec3(seen_place, shadow_layer), 0).r;
+  ivec2 place = seen_place + ivec2(0, object_layer * imageSize(fronts).x);
   if (IS_FRONT) {
     if (depth > hidden) {
       return;
@@ -49,7 +51,7 @@ void meet(ivec2 place, float along, float across, float coverage)
     }
   }
   else {
-    vec2 ends = texelFetch(hair_front, ivec3(place, lights.light[view.light_index].shadow_layer), 0).rg;
+    vec2 ends = texelFetch(hair_front, ivec3(seen_place, shadow_layer), 0).rg;
     int layer = layer_among(depth, ends, hidden);
     if (layer > 3) {
       return;
@@ -64,5 +66,5 @@ const bool HAS_TILES = false;
 
 void main()
 {
-  walk_run(imageSize(fronts));
+  walk_run(ivec2(imageSize(fronts).x));
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hair object of a thread among linked objects, which share strands and look. `view` is a variable here: the block
-// `shared_view` with the numbers of the object, from a row of the texture `objects`, which
+// The hair object of a thread among linked objects, which share strands and look. `view` is a variable here: the block of
+// strands/shared_view.glsl with the numbers of the object, from a row of the texture `objects`, which
 // hair_addon/blender/gpu/strand_batches.py fills. Programs for linked objects include this file first.
 
 View view;
 int first_run;  // of the object, in `seen_runs`
 int object_row;  // of the object, in the texture `objects`
-int object_layer;  // of the object, in the textures of the world's visibility
+int object_layer;  // of the object, in the textures of the world's visibility; or its map among those drawn together
 
 const int NUMBER_TEXEL = 8;
 const int SEGMENT_TEXEL = 9;
@@ -33,10 +33,14 @@ int whole_number(vec2 parts)
   return int(parts.x) * 65536 + int(parts.y);
 }
 
+#include "strands/shared_view.glsl"
+
 void choose_object(int row)
 {
   object_row = row;
-  view = shared_view;
+  vec4 segments = object_texel(row, SEGMENT_TEXEL);
+  object_layer = int(segments.z);
+  view = view_of_layer(object_layer);
   view.object_to_world = object_matrix(row, 0);
   view.object_to_clip = object_matrix(row, 4);
   vec4 numbers = object_texel(row, NUMBER_TEXEL);
@@ -44,8 +48,6 @@ void choose_object(int row)
   view.drawn_strands = int(numbers.y);
   view.object_scale = numbers.z;
   view.thickness = numbers.w;
-  vec4 segments = object_texel(row, SEGMENT_TEXEL);
   view.first_segment = whole_number(segments.xy);
-  object_layer = int(segments.z);
   first_run = whole_number(object_texel(row, RUN_TEXEL).xy);
 }

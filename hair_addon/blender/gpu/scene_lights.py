@@ -90,9 +90,7 @@ def gather(found, links, patterns, world, receivers):
         sun["axis"][:3], sun["power"][:3] = -lobe.direction, lobe.irradiance
         sun["group"] = world.group
         sun["radius"] = 2.0 * np.sqrt(lobe.variance)  # a disk's variance along an axis is a quarter of its radius²
-    # Written out, as `np.concatenate` compares the members of records first, which takes longer.
-    own, found = found, np.empty(len(found) + len(suns), found.dtype)
-    found[: len(own)], found[len(own) :] = own, suns
+    own, found = found, uniforms.joined([found, suns])
     links = [*links, *([(ALL, ALL)] * len(suns))]
     importance = _importance(found, links, receivers)
     order = np.argsort(-importance, kind="stable")

@@ -2,9 +2,10 @@
 """Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and depths of surfaces."""
 
 import weakref
+from collections import Counter
 from dataclasses import replace
 from functools import partial
-from itertools import groupby
+from itertools import batched
 
 import gpu
 import numpy as np
@@ -58,14 +59,13 @@ class ShadowMaps:
         self._surfaces = {}  # layer → inputs that its surfaces were drawn with
         self._strands = {}  # layer → (its value in `_surfaces`, what its strands were drawn with, references to these)
         self._linked = (), []  # the surfaces of the last map, and `linked` of them
-        self._hidden = {}  # layer → texture of the depth behind which surfaces hide strands
+        self._hidden = _array(size, layer_count, "R32F")  # depth behind which surfaces hide strands
         # Targets of drawing, which are then filtered into a map.
         self._surface_depth = _array(size, 1, "RG32F")  # depth and color of surfaces
         self._half_blurred = _array(size, 1, "RGBA32F")
-        self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
-        self._row_ends = gpu.types.GPUTexture((size, size), format="RG32F")
-        self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
-        self._is_empty = False  # whether the images that strands are rasterized into are cleared
+        self._room = 0  # number of maps that are stacked in the images that strands are rasterized into
+        self._fronts = self._backs = self._row_ends = self._counts = None
+        self._is_empty = False  # whether these images are cleared
         self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
         self._drawing_depth = gpu.types.GPUFrameBuffer(
             color_slots=_slot(self._surface_depth, 0), depth_slot=self._depth
@@ -117,9 +117,17 @@ class ShadowMaps:
         if views:
             light_block = uniforms.uniform_buffer(lights)  # each map only reads its own light
             casts = {index: (hair, surfaces) if casters is None else casters(index) for index in views}
-            all_placed = _placed(views, casts, steps, is_steady, counted)
+            all_placed, new = _placed(views, casts, steps, is_steady, counted), {}
             for index, view in views.items():
-                self._draw_light(index, view, lights, light_block, all_placed[index], casts[index][1])
+                self._hide(index, view, lights, casts[index][1])
+                drawn_with = self._new_strands(index, view, lights, all_placed[index])
+                if drawn_with is not None:
+                    self._strands.pop(index, None)  # in case drawing fails
+                    new[index] = drawn_with
+            draw, most = (self._walk, uniforms.MAP_CAPACITY) if self._in_compute else (self._draw_strips, 1)
+            for some in batched(new, most, strict=False):
+                draw([(views[index], all_placed[index]) for index in some], light_block)
+                self._strands.update({index: new[index] for index in some})
 
     def _aimed(self, index, light, hair, loose):
         """`_aim`, cached while the light and the sphere stay the same."""
@@ -139,18 +147,6 @@ class ShadowMaps:
         if view is not None and (light["kind"] == SUN or not _is_inside(light["position"][:3].astype(float), *loose)):
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
-
-    def _draw_light(self, layer, view, lights, light_block, placed, surfaces):
-        hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
-        drawn_with = self._new_strands(layer, view, lights, placed)
-        if drawn_with is None:
-            return
-        self._strands.pop(layer, None)  # in case drawing fails
-        if self._in_compute:
-            self._walk(layer, placed, light_block, hidden)
-        else:
-            self._draw_strips(layer, placed, light_block, hidden)
-        self._strands[layer] = drawn_with
 
     def _new_strands(self, layer, view, lights, placed):
         """Return the value of a layer in `_strands` for strands and a light; None if it was drawn with these.
@@ -184,15 +180,10 @@ class ShadowMaps:
             chosen = surfaces if casters is None else casters(index)[1]
             self._are_surfaces_new(self.layer_count + index, view, seen_from, chosen)
 
-    def _hiding_depth(self, layer, view, lights, surfaces):
-        """Draw surfaces into a map, if changed; returns the texture of the depth behind which they hide strands."""
-        hidden = self._hidden.get(layer)
-        if not self._are_surfaces_new(layer, view, lights, surfaces):
-            return hidden
-        if hidden is None:
-            hidden = self._hidden[layer] = gpu.types.GPUTexture((self._size, self._size), format="R32F")
-        self._filter(shadow_programs.hidden_program(), hidden, surface_depth=self._surface_depth)
-        return hidden
+    def _hide(self, layer, view, lights, surfaces):
+        """Draw surfaces into a map, and the depth behind which they hide strands, if they have changed."""
+        if self._are_surfaces_new(layer, view, lights, surfaces):
+            self._filter(shadow_programs.hidden_program(), self._hidden, layer, surface_depth=self._surface_depth)
 
     def _are_surfaces_new(self, layer, view, lights, surfaces):
         """Draw surfaces into a layer from the light of a view, if changed; returns whether they were drawn."""
@@ -220,57 +211,61 @@ class ShadowMaps:
             self._linked = surfaces, surface_textures.linked(surfaces, has_color=True)
         return self._linked[1]
 
-    def _walk(self, layer, placed, lights, hidden):
-        """Draw a map of strands by compute programs, with integer sums that do not depend on the order.
+    def _make_room(self, count):
+        """Allocate the images that strands are rasterized into, for at least `count` maps."""
+        if count <= self._room:
+            return
+        size, self._room, self._is_empty = self._size, count, False
+        self._fronts, self._backs = (gpu.types.GPUTexture((size, size * count), format="R32UI") for _ in range(2))
+        self._row_ends = gpu.types.GPUTexture((size, size * count), format="RG32F")
+        self._counts = gpu.types.GPUTexture((4 * size, size * count), format="R32UI") if self._in_compute else None
 
-        placed: as from `_placed`.
+    def _walk(self, maps, lights):
+        """Draw maps of strands by compute programs, with integer sums that do not depend on the order.
+
+        maps: [(view, value of `_placed`)], at most `uniforms.MAP_CAPACITY`. They are drawn together: for each hair and
+        pass the call of a program takes the processor longer than its threads take a GPU.
         """
-        samplers = {"hair_front": self._hair_front, **hidden}
+        self._make_room(len(maps))
+        samplers = {"hair_front": self._hair_front, "hidden_depth": self._hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
+        block = _block_of({place: view for place, (view, _placed) in enumerate(maps)})
         if not self._is_empty:
             self._clear_ends()
             self._counts.clear(format="UINT", value=(0,))
         self._is_empty = False
-        bounding = [(strands, *_on_gpu(records)) for strands, records, _counted in placed]
-        counting = [
-            bound if counted is records else (strands, *_on_gpu(counted))
-            for bound, (strands, records, counted) in zip(bounding, placed, strict=True)
-        ]
+        objects = _objects_in(maps)
         for is_front in (True, False):
-            drawn = bounding if is_front else counting
-            for is_batch, some in groupby(drawn, key=lambda one: one[2] is not None):
-                program = scene_programs.strand_shadow_program(is_front, is_batch)
-                with drawing.rasterizing(program, {"lights": lights}, samplers, images, {}):
-                    for strands, record, objects, view in some:
-                        if objects is None:
-                            drawing.rasterize_strands(strands, program, record, {"view": view}, {})
-                        else:
-                            objects.rasterize(strands, program, {"shared_view": view}, {})
+            program = scene_programs.strand_shadow_program(is_front)
+            with drawing.rasterizing(program, {"lights": lights}, samplers, images, {}):
+                for strands, views, bounding, counting in objects:
+                    (bounding if is_front else counting).rasterize(strands, program, {"shadow_views": views}, {})
             if is_front:
-                self._fill_fronts(layer)
-        self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
+                self._fill_fronts(block, len(maps))
+        self._filter(shadow_programs.counts_program(), self._hair_layers, images=images, block=block, count=len(maps))
         self._is_empty = True
 
     def _clear_ends(self):
         self._fronts.clear(format="UINT", value=(_NOTHING,))
         self._backs.clear(format="UINT", value=(0,))
 
-    def _draw_strips(self, layer, placed, lights, hidden):
-        """Draw a map of strands as triangle strips; placed: as for `_walk`."""
+    def _draw_strips(self, maps, lights):
+        """Draw a map of strands as triangle strips; maps: as for `_walk`, a single one."""
+        self._make_room(1)
+        ((view, placed),) = maps
+        layer, hidden = int(view["light_index"]), {"hidden_depth": self._hidden}
         each = [(strands, record) for strands, records, _counted in placed for record in records]
         counting = [(strands, record) for strands, _records, counted in placed for record in counted]
         self._clear_ends()
-        end = scene_programs.strip_program(
-            "shadows/shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden)
-        )
-        layers = scene_programs.strip_program("shadows/shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
+        end = scene_programs.strip_program("shadows/shadow_front.frag", tuple(hidden), (("front", "UINT"),))
+        layers = scene_programs.strip_program("shadows/shadow_layers.frag", ("hair_front", *hidden))
         for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
             target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self._depth)
             with target.bind(), drawing.gpu_state(test, depth_writes=True):
                 target.clear(depth=depth)
                 for strands, record in each:
                     drawing.draw_strip(strands, end, record, lights, hidden)
-        self._fill_fronts(layer)
+        self._fill_fronts(_block_of({0: view}), 1)
         with (
             self._target(self._hair_layers, layer),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
@@ -278,10 +273,11 @@ class ShadowMaps:
             for strands, record in counting:
                 drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front, **hidden})
 
-    def _fill_fronts(self, layer):
-        ends = {"fronts": self._fronts, "backs": self._backs}
-        self._filter(shadow_programs.rows_program(), self._row_ends, **ends)
-        self._filter(shadow_programs.fill_program(), self._hair_front, layer, **ends, row_ends=self._row_ends)
+    def _fill_fronts(self, block, count):
+        """Fill gaps of the fronts and backs of `count` maps; block: of their views."""
+        ends, program = {"fronts": self._fronts, "backs": self._backs}, shadow_programs.fill_program()
+        self._filter(shadow_programs.rows_program(), self._row_ends, count=count, **ends)
+        self._filter(program, self._hair_front, block=block, count=count, **ends, row_ends=self._row_ends)
 
     def _blur(self, layer, deviation):
         """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation [texels]."""
@@ -298,14 +294,17 @@ class ShadowMaps:
             program.uniform_float("deviation", deviation)
             self._filter(program, target, target_layer, surface_depth=source)
 
-    def _filter(self, program, target, layer=None, images=None, **sources):
-        """Write a whole texture, or a layer of it, with a program; sources: {sampler: texture}."""
-        with drawing.bound(program, {}, sources):
+    def _filter(self, program, target, layer=None, images=None, block=None, count=1, **sources):
+        """Write a whole texture, or layers of it, with a program; sources: {sampler: texture}.
+
+        layer: the layer; block: of the views of the maps whose layers are written; count: of stacked maps.
+        """
+        with drawing.bound(program, {} if block is None else {"shadow_views": block}, sources):
             for name, image in ({"filtered": target} | (images or {})).items():
                 program.image(name, image)
             if layer is not None:
                 program.uniform_int("layer", layer)
-            drawing.dispatch_over(program, (self._size, self._size))
+            drawing.dispatch_over(program, (self._size, self._size * count))
 
     def _target(self, texture, layer=None, value=(0.0,) * 4):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(texture, layer), depth_slot=self._depth)
@@ -386,9 +385,39 @@ def _fewer(records, count):
     return fewer
 
 
-def _on_gpu(records):
-    """Return (first record, `strand_batches.Objects` or None, block of the first record) of `_records`."""
-    return records[0], strand_batches.objects_of(records), uniforms.uniform_buffer(records[0])
+def _objects_in(maps):
+    """Return [(StrandsOnGPU, block of its views, `strand_batches.Objects` of all strands, and of counted strands)] of
+    the hair in maps; maps: as for `ShadowMaps._walk`.
+    """
+    found = {}
+    for place, (_view, placed) in enumerate(maps):
+        turns = Counter()  # linked hair may be in several groups
+        for strands, records, counted in placed:
+            key = id(strands), turns[id(strands)]
+            turns[id(strands)] += 1
+            found.setdefault(key, (strands, []))[1].append((place, records, counted))
+    return [(strands, *_together(parts)) for strands, parts in found.values()]
+
+
+def _together(parts):
+    """Return (block of views, `Objects` of all strands, `Objects` of counted strands) of [(map, (N,) records, (N,)
+    counted records)].
+    """
+    places = np.repeat([place for place, _records, _counted in parts], [len(records) for _p, records, _c in parts])
+    bounding = strand_batches.Objects(uniforms.joined([records for _p, records, _c in parts]), places, 0)
+    counting = bounding
+    if any(counted is not records for _place, records, counted in parts):
+        counting = strand_batches.Objects(uniforms.joined([counted for _p, _r, counted in parts]), places, 0)
+    return _block_of({place: records[0] for place, records, _counted in parts}), bounding, counting
+
+
+def _block_of(views):
+    """Return the block of {place among maps that are drawn together: `uniforms.VIEW` record}."""
+    record = uniforms.SHADOW_VIEWS.record()
+    record["view"]["light_index"] = -1
+    for place, view in views.items():
+        record["view"][place] = view
+    return uniforms.uniform_buffer(record)
 
 
 def _array(size, layer_count, texture_format):

@@ -71,8 +71,8 @@ def groups_of(keys):
 class Objects:
     """The texture of the objects of a `Batch` that a picture shows, and their work groups.
 
-    records: (N,) of `drawing.strand_records`; layers: (N,); first_run: number of runs of segments before these objects;
-    tints: (N, 3), None for white.
+    records: (N,) of `drawing.strand_records`; layers: (N,), in shadow maps the map of each object; first_run: number of
+    runs of segments before these objects; tints: (N, 3), None for white.
     """
 
     def __init__(self, records, layers, first_run, tints=None):
@@ -107,11 +107,6 @@ class Objects:
         drawing.provide(program, blocks, {**drawing.strand_samplers(strands), "objects": self.texture})
         drawing.set_integers(program, constants | {"object_count": self.count})
         run_for_each(program, int(self._group_counts[part]), 1)
-
-
-def objects_of(records):
-    """Return the `Objects` of (N,) records for a shadow map; None for a single object."""
-    return None if len(records) == 1 else Objects(records, np.zeros(len(records)), 0)
 
 
 def _halves(numbers):

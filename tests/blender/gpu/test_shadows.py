@@ -4,6 +4,7 @@
 from dataclasses import replace
 from functools import partial
 
+import gpu
 import numpy as np
 import pytest
 
@@ -124,18 +125,17 @@ def test_only_maps_that_change_are_drawn_again(scene, rng, monkeypatch):
     """Maps of unchanged lights, strands and surfaces stay, and all maps are those that are drawn at once."""
     points, radii = tuft(rng, 500)
     floor = np.float32([(-1.0, -1.0, -0.2), (1.0, -1.0, -0.2), (0.0, 1.0, -0.2)])
-    kept, calls = shadows.ShadowMaps(64, 2, in_compute=True), []
-    real = drawing.rasterize_strands
-    monkeypatch.setattr(drawing, "rasterize_strands", lambda *given: calls.append(1) or real(*given))
+    kept, drawn, real = shadows.ShadowMaps(64, 2, in_compute=True), [], shadows.ShadowMaps._walk
+    monkeypatch.setattr(shadows.ShadowMaps, "_walk", lambda *given: drawn.extend(given[1]) or real(*given))
 
     def maps_drawn(azimuth, radius, hair, surfaces, steps, counted=None):
         found = []
         for maps in (kept, shadows.ShadowMaps(64, 2, in_compute=True)):
             lights = sun(azimuth, 0.8, radius)
             lights["count"], lights["light"][1] = 2, sun(2.0, 0.5)["light"][0]
-            calls.clear()
+            drawn.clear()
             maps.draw(lights, hair, surfaces, steps, counted=counted)
-            found.append((len(calls) // 2, [np.array(texture.read()) for texture in maps.samplers.values()]))
+            found.append((len(drawn), [np.array(texture.read()) for texture in maps.samplers.values()]))
         (count, textures), (all_count, others) = found
         assert all_count == 2
         for texture, other in zip(textures, others, strict=True):
@@ -162,7 +162,7 @@ def test_only_maps_that_change_are_drawn_again(scene, rng, monkeypatch):
     assert [maps_drawn(*given, counted) for counted in (100, 50, 50, None)] == [0, 2, 0, 2]
     given[0] = 0.5
     with monkeypatch.context() as patched:
-        patched.setattr(drawing, "rasterize_strands", failed)
+        patched.setattr(strand_batches.Objects, "rasterize", failed)
         with pytest.raises(HairError):
             maps_drawn(*given)
     assert maps_drawn(*given) == 1  # a map whose drawing failed is drawn again
@@ -360,15 +360,15 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
         light["axis"][:3] = 0.0, 0.0, -1.0
     steps, calls, alone = drawing.Steps(strand_count=30), [], drawing.strand_records
     monkeypatch.setattr(drawing, "strand_records", lambda *given: calls.append(given[0]) or alone(*given))
-    tables, table_of = [], strand_batches.objects_of
-    monkeypatch.setattr(strand_batches, "objects_of", lambda records: tables.append(1) or table_of(records))
+    tables, objects = [], strand_batches.Objects
+    monkeypatch.setattr(strand_batches, "Objects", lambda *given: tables.append(1) or objects(*given))
     maps = shadows.ShadowMaps(64, 4, in_compute=True)
     maps.draw(lights, hair, [], steps, counted=30)
-    assert len(tables) == 2 * 4  # of linked objects, for each hair and light
+    assert len(tables) == 2  # one of all linked objects and lights, for each hair
     assert calls == [many, few]
     calls.clear()
     maps.draw(lights, hair, [], steps, counted=20)
-    assert len(tables) == 3 * 2 * 4  # others for the counted strands
+    assert len(tables) == 3 * 2  # others for the counted strands
     assert calls == [many, few]
     maps.draw(lights, hair, [], steps, lambda index: (hair[:2] if index == 1 else hair, []), counted=20)
     assert calls == [many, few] * 2 + [many]
@@ -380,14 +380,52 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
         np.testing.assert_array_equal(records, shadows._records(many, view, to_world, drawing.Steps(), False))
 
 
+def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, rng, monkeypatch):
+    """Maps of ten lights, of linked and uneven hair that casts shadows of some lights alone, have the same bits whether
+    they are drawn together or one after the other.
+    """
+    points, radii = tuft(rng, 200)
+    many, few = (strand_textures.upload_strands(points[:count], radii[:count]) for count in (200, 30))
+    places = np.diag([1.0, 1.0, 1.0, 1.0]), np.diag([0.4, -0.5, 0.4, 1.0]), np.diag([0.01, 0.02, 0.03, 1.0])
+    hair = [(strands, place) for place in places for strands in (many, few)]
+    floor = np.float32([(-1.0, -1.0, 0.1), (1.0, -1.0, 0.1), (0.0, 1.0, 0.1)])
+    surfaces = [surface_textures.upload_surface(floor, np.int32([[0, 1, 2]]))]
+    lights = sun(0.4, 0.7)
+    lights["count"] = 10
+    for index in range(1, 10):
+        lights["light"][index] = sun(0.6 * index, 0.3 + 0.1 * index)["light"][0]
+        if index % 2:
+            lights["light"]["kind"][index], lights["light"]["position"][index, :3] = 1, (0.5 * index, -2.0, 1.0)
+    found, textures = [], []
+    for most in (uniforms.MAP_CAPACITY, 1):
+        monkeypatch.setattr(uniforms, "MAP_CAPACITY", most)
+        maps, record = shadows.ShadowMaps(48, 10, in_compute=True), lights.copy()
+        some = [([], []), (hair[:1], surfaces), (hair[1:], []), (hair, surfaces)]
+        maps.draw(record, hair, surfaces, drawing.Steps(), lambda index, some=some: some[index % 4], counted=20)
+        found.append(record)
+        both = maps.samplers["hair_front"], maps.samplers["hair_layers"]
+        textures.append([layer_of(texture, index) for texture in both for index in range(10)])
+    assert found[0].tobytes() == found[1].tobytes()
+    np.testing.assert_array_equal(*textures)
+    assert [layer[..., :2].any() for layer in textures[0][10:]] == [index % 4 > 0 for index in range(10)]
+
+
+def layer_of(texture, layer):
+    """Return (height, width, 4) of a layer of an array texture."""
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
+    with framebuffer.bind():
+        pixels = framebuffer.read_color(0, 0, texture.width, texture.height, 4, 0, "FLOAT")
+    return np.array(pixels, np.float32).reshape(texture.height, texture.width, 4)
+
+
 def test_maps_of_strands_that_the_gpu_makes_do_not_wait_for_their_bounds(scene, rng, monkeypatch):
     """Maps are drawn before the bounds are read, and are the same as with known bounds, also if strands outgrow
     them.
     """
     points, radii = tuft(rng, 300)
     waits, knows = (shadows.ShadowMaps(64, 2, in_compute=True) for _ in range(2))
-    events, real = [], drawing.rasterize_strands
-    monkeypatch.setattr(drawing, "rasterize_strands", lambda *given: events.append("drawn") or real(*given))
+    events, real = [], shadows.ShadowMaps._walk
+    monkeypatch.setattr(shadows.ShadowMaps, "_walk", lambda *given: events.append("drawn") or real(*given))
 
     def read(bounds):
         events.append("read")
@@ -409,5 +447,5 @@ def test_maps_of_strands_that_the_gpu_makes_do_not_wait_for_their_bounds(scene, 
         for texture, other in zip(waits.samplers.values(), knows.samplers.values(), strict=True):
             np.testing.assert_array_equal(np.array(texture.read()), np.array(other.read()))
         counts.append((events.index("read"), len(events) - 1))
-    # Each map draws the strands twice. The aim changes with the second, fourth and last hair.
-    assert counts == [(0, 4), (4, 8), (4, 4), (4, 8), (4, 4), (4, 8)]
+    # The aim changes with the second, fourth and last hair, whose maps are drawn twice.
+    assert counts == [(0, 1), (1, 2), (1, 1), (1, 2), (1, 1), (1, 2)]

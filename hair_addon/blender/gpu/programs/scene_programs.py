@@ -27,15 +27,20 @@ _BATCH_REPLACED = {
     "light/strand_visibility.glsl": "light/layer_visibility.glsl",
     "fibre/solid_tint.glsl": "strands/batch_tint.glsl",
 }
+_MAPS_REPLACED = {"strands/shared_view.glsl": "shadows/view_of_map.glsl"}
 _BATCH_SAMPLER = ("objects", "FLOAT_2D")
 
 
-def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True, is_batch=False):
+def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True, is_batch=False, is_of_maps=False):
     """Declare the inputs of all scene shaders: camera, lights, shadow maps, world lighting; is_batch: for linked hair
-    objects.
+    objects; is_of_maps: of several shadow maps.
     """
-    info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
-    info.uniform_buf(0, "View", "shared_view" if is_batch else "view")
+    structs = uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs
+    info.typedef_source(structs + uniforms.SHADOW_VIEWS.source if is_of_maps else structs)
+    if is_of_maps:
+        info.uniform_buf(0, "ShadowViews", "shadow_views")
+    else:
+        info.uniform_buf(0, "View", "shared_view" if is_batch else "view")
     info.uniform_buf(1, "Lights", "lights")
     for slot, name in enumerate(shadow_samplers):
         info.sampler(slot, "FLOAT_2D_ARRAY", name)
@@ -44,12 +49,12 @@ def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True
             info.sampler(slot, "FLOAT_2D_ARRAY" if is_batch else "FLOAT_2D", name)
 
 
-def declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch=False):
-    """`declare_scene` without the world's lighting; returns the includes that clipping replaces."""
+def declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch=False, is_of_maps=False):
+    """`declare_scene` without the world's lighting; returns the includes that are replaced."""
     structs = uniforms.CLIPPING.source if is_clipped else ""
-    declare_scene(info, structs, shadow_samplers, is_lit=False, is_batch=is_batch)
+    declare_scene(info, structs, shadow_samplers, is_lit=False, is_batch=is_batch, is_of_maps=is_of_maps)
     if not is_clipped:
-        return {}
+        return _MAPS_REPLACED if is_of_maps else {}
     info.uniform_buf(2, "Clipping", "clipping")
     return {"visibility/unclipped.glsl": "visibility/clipped.glsl"}
 
@@ -60,15 +65,13 @@ def has_image_atomics():
 
 
 @cached
-def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
+def strip_program(fragment, shadow_samplers=(), targets=COLOR):
     """Return the program that draws strips of strands with a .frag; targets: its (output, type), ...
 
-    shadow_samplers, samplers: of shadow maps and of other textures.
+    shadow_samplers: of shadow maps.
     """
     info = gpu.types.GPUShaderCreateInfo()
     replaced = _strip(info, shadow_samplers, is_clipped=False)
-    for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
-        info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "strands/strip.vert", fragment, targets, replaced)
 
 
@@ -136,14 +139,10 @@ def segments_program(is_depth, is_round, is_clipped=False, is_batch=False, is_co
 
 
 @cached
-def strand_shadow_program(is_front, is_batch=False):
-    """Return the compute program that draws strands into a deep opacity map: see shadows/strand_shadow.comp.
-
-    is_batch: of linked hair objects.
-    """
-    images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
-    defined = {"IS_FRONT": is_front, "IS_ROUND": False}
-    options = {"shadow_samplers": ("hair_front",), "samplers": samplers, "is_batch": is_batch}
+def strand_shadow_program(is_front):
+    """Return the compute program that draws strands into deep opacity maps: see shadows/strand_shadow.comp."""
+    images, defined = ("fronts", "backs", "counts"), {"IS_FRONT": is_front, "IS_ROUND": False}
+    options = {"shadow_samplers": ("hair_front", "hidden_depth"), "is_batch": True, "is_of_maps": True}
     return _walk("shadows/strand_shadow.comp", images, defined, **options)
 
 
@@ -156,12 +155,13 @@ def _walk(
     samplers=(),
     is_clipped=False,
     is_batch=False,
+    is_of_maps=False,
     counting=None,
 ):
     info = gpu.types.GPUShaderCreateInfo()
     for name, value in defined.items():
         info.define(name, str(value).lower())
-    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch) | (counting or {})
+    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped, is_batch, is_of_maps) | (counting or {})
     if is_batch:
         samplers, constants = (*samplers, _BATCH_SAMPLER), (*constants, "object_count")
     info.local_group_size(RUN_GROUP_SIZE)
