@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
-from bpy.types import Curves
+from bpy.types import Curves, PropertyGroup
 
 from ...core.geometry.faces.uv_maps import Texture
 from ...core.geometry.mesh import TriMesh
@@ -52,7 +52,7 @@ def of_guides(
     """
     given = _counted(given, surface, mask, target)
     key = root_key(given, surface, mask)
-    unchanged = _unchanged_sizes(target and target.vellus.guides, given)
+    unchanged = unchanged_sizes(target and target.vellus.guides, given)
     is_refitted = target is not None and target.vellus.fit_key != key
     opened = fitted_sizes.opened(given, unchanged) if is_refitted else given
     completed = groom_defaults.complete(opened, surface.posed_mesh, *mask)
@@ -73,7 +73,7 @@ def of_hair(
     given = _counted(given, surface, mask, target)
     key = root_key(given, surface, mask)
     fit_key = f"{key} {guide_count}"
-    unchanged = _unchanged_sizes(target and target.vellus.hair, given)
+    unchanged = unchanged_sizes(target and target.vellus.hair, given)
     is_refitted = target is not None and target.vellus.fit_key != fit_key
     opened = fitted_sizes.opened(given, unchanged) if is_refitted else given
     completed = groom_defaults.complete(opened, surface.posed_mesh, *mask, guide_count)
@@ -118,7 +118,7 @@ def show(hair: Curves, settings: HairSettings, fits: Fits) -> None:
     hair.vellus.fit_key = fits.key
 
 
-def _unchanged_sizes(group, given):
+def unchanged_sizes(group: PropertyGroup | None, given: Settings) -> set[str]:
     """Return the fitted sizes of a property group that `given` settings do not change."""
     if group is None:
         return set()

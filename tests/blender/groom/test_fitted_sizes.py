@@ -97,6 +97,19 @@ def test_what_an_operator_or_a_script_gives_stays(mask_first, sphere):
     assert sizes_of(scripted)["gravity"] != np.float32(0.1)  # None: it follows again
 
 
+@pytest.mark.parametrize("is_undone", [False, True])
+def test_a_style_preset_leaves_sizes_fitted(mask_first, is_undone):
+    """A preset of styles sets no sizes: these are still fitted to the next mask, also after undo and redo."""
+    add(**COUNTS)
+    assert bpy.ops.vellus.apply_style_preset("EXEC_DEFAULT", True, preset="CURLY") == {"FINISHED"}
+    if is_undone:
+        bpy.ops.ed.undo()
+        bpy.ops.ed.redo()
+    hair = bpy.data.objects["Hair"].data
+    choose_mask(hair)
+    assert sizes_of(hair) == mask_first
+
+
 def test_regenerated_guides_follow_on(mask_first):
     hair = add(**COUNTS)
     guides = bpy.data.objects["Hair Guides"]

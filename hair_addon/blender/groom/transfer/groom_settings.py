@@ -16,7 +16,7 @@ from ...data import scene, whole_changes
 from ...data.strands import curves
 from ...materials import looks
 from ...settings import fitted_sizes, map_items, properties, ramp_nodes, setting_properties, style_items
-from .. import pipeline, writing
+from .. import pipeline, size_fitting, writing
 from ..foreign import hand_made_guides
 
 
@@ -35,8 +35,8 @@ def settings_of(hair: Curves) -> GroomSettings:
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     """Apply settings to a hair Curves datablock and its guides; Blender's next update regenerates them.
 
-    Combed guides and hair do not change, as with any change of settings. Unset values are fitted to the surface. Raises
-    `HairError` before anything changes.
+    Combed guides and hair do not change, as with any change of settings. Unset values are fitted to the surface, and
+    unchanged ones stay fitted. Raises `HairError` before anything changes.
     """
     guides, _settings = pipeline.inputs_of(hair)
     for target in (guides, hair):
@@ -45,11 +45,11 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     of_guides, of_hair = pipeline.complete(guides.surface, settings.guides, settings.hair, depsgraph)
     groups = (guides.vellus.guides, settings.guides, of_guides), (hair.vellus.hair, settings.hair, of_hair)
     for group, given, wanted in groups:
+        fits = size_fitting.unchanged_sizes(group, given) | fitted_sizes.open_names(given)
         # Otherwise everything would be regenerated unnecessarily.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
-        is_open = fitted_sizes.open_names(given)
-        fitted_sizes.keep_flags(group, {name: name in is_open for name in fitted_sizes.fitted(type(given))})
+        fitted_sizes.keep_flags(group, {name: name in fits for name in fitted_sizes.fitted(type(given))})
     assign_dynamics(guides, settings.dynamics)
     style_items.assign(hair.vellus, settings.styles, settings.style_names)
     _assign_shading(hair, settings)
