@@ -23,6 +23,7 @@ _STEPS = wp.constant(1023.0)  # steps of this point's place, along each axis
 LINE_CENTRE = wp.constant(511.5)  # half of these steps
 _TURNS = wp.constant(65535.0)  # steps of a line's direction, along both axes
 LINE_ERROR = wp.constant(0.004)  # maximum distance in cells between a line and its stored form
+_COUNT, _WRITE, _COUNT_BY_CELL, _PUT = (wp.constant(step) for step in range(4))  # steps of `_find`
 _WIDTHS = wp.constant(4)  # number of stored radii, each half the previous one
 
 
@@ -179,26 +180,30 @@ def _halvings_of(hair: _Strands, axis: _Axis):
 @wp.kernel
 def _find(
     hair: _Strands,
-    is_counting: int,
+    step: int,
     bricks: wp.array[int],
     ends: wp.array[wp.int64],
+    first: int,
+    out_by_cell: wp.array[int],
     out_is_used: wp.array[int],
     out_cells: wp.array[int],
     out_segments: wp.array[int],
     out_lines: wp.array[wp.uint32],
-    first: int,
 ):
-    """Count the cells of each segment and mark their voxels, or write them before the segment's end.
-
-    The cells of a segment are found layer by layer, and within a layer row by row, so that only touched cells are
+    """Find the cells of each segment, layer by layer, and within a layer row by row, so that only touched cells are
     visited.
+
+    step: `_COUNT` the cells of each segment, and mark their voxels; `_WRITE` cells before the segment's end;
+    `_COUNT_BY_CELL` the segments of each cell of all voxels, in the segments' order on one CPU core; `_PUT` segments at
+    these cells' next places in the same order.
     """
     segment = first + wp.tid()
     if hair.strands[segment] != hair.strands[segment + 1]:
-        if is_counting == 1:
+        if step == _COUNT:
             ends[segment] = wp.int64(0)
         return
     k = hair.along_voxel
+    of_division = 65536 // k + 1  # a factor instead of divisions by k, which take longer
     side = hair.voxel / float(k)
     per_side = 1.0 / side
     axis = _axis_of(hair, segment, side)
@@ -207,9 +212,10 @@ def _find(
     count = int(0)
     at = int(0)
     end = int(0)
-    if is_counting == 0:
+    if step == _WRITE or step == _PUT:
         halvings = _halvings_of(hair, axis)
         turned = _direction_word(axis.way)
+    if step == _WRITE:
         end = int(ends[segment])
         if segment > 0:
             at = int(ends[segment - 1])
@@ -217,34 +223,45 @@ def _find(
     for z in range(low_z, high_z + 1):
         first_z, last_z = _part_in_layer(hair, axis, 2, z, 0.0, 1.0, side)
         if first_z <= last_z:
+            voxel_z = (z * of_division) >> 16
             low_y, high_y = _cells_along(hair, axis, 1, first_z, last_z, per_side)
             for y in range(low_y, high_y + 1):
                 first_y, last_y = _part_in_layer(hair, axis, 1, y, first_z, last_z, side)
                 if first_y <= last_y:
-                    row = ((z / k) * hair.shape[1] + y / k) * hair.shape[0]
+                    voxel_y = (y * of_division) >> 16
                     low_x, high_x = _cells_along(hair, axis, 0, first_y, last_y, per_side)
-                    if is_counting == 1:
-                        count += high_x - low_x + 1
-                        for voxel in range(low_x / k, high_x / k + 1):
-                            out_is_used[row + voxel] = 1
-                    else:
-                        voxel = row + low_x / k
-                        in_voxel = low_x % k
-                        in_brick = ((z % k) * k + y % k) * k
-                        centre = hair.corner + side * wp.vec3(float(low_x) + 0.5, float(y) + 0.5, float(z) + 0.5)
-                        for _x in range(low_x, high_x + 1):
+                    voxel_x = (low_x * of_division) >> 16
+                    voxel = (voxel_z * hair.shape[1] + voxel_y) * hair.shape[0] + voxel_x
+                    in_voxel = low_x - k * voxel_x
+                    in_brick = ((z - k * voxel_z) * k + y - k * voxel_y) * k
+                    centre = hair.corner + side * wp.vec3(float(low_x) + 0.5, float(y) + 0.5, float(z) + 0.5)
+                    count += high_x - low_x + 1
+                    x = int(low_x)
+                    while x <= high_x:
+                        if step == _COUNT:
+                            out_is_used[voxel] = 1
+                        elif step == _WRITE:
                             if at < end:
                                 out_cells[at] = bricks[voxel] * k * k * k + in_brick + in_voxel
                                 out_segments[at] = segment
                                 out_lines[2 * at] = _place_word(axis.origin, axis.way, centre, side, halvings)
                                 out_lines[2 * at + 1] = turned
                                 at += 1
-                            in_voxel += 1
-                            if in_voxel == k:
-                                in_voxel = 0
-                                voxel += 1
-                            centre += wp.vec3(side, 0.0, 0.0)
-    if is_counting == 1:
+                        else:
+                            cell = voxel * k * k * k + in_brick + in_voxel
+                            place = out_by_cell[cell]
+                            out_by_cell[cell] = place + 1
+                            if step == _PUT:
+                                out_segments[place] = segment
+                                out_lines[2 * place] = _place_word(axis.origin, axis.way, centre, side, halvings)
+                                out_lines[2 * place + 1] = turned
+                        in_voxel += 1
+                        if in_voxel == k:
+                            in_voxel = 0
+                            voxel += 1
+                        centre += wp.vec3(side, 0.0, 0.0)
+                        x += 1
+    if step == _COUNT:
         ends[segment] = wp.int64(count)
 
 
@@ -255,51 +272,44 @@ def _number(is_used: wp.array[int], ends: wp.array[int], out_bricks: wp.array[in
 
 
 @wp.kernel
-def _count(cells: wp.array[int], first: int, out_counts: wp.array[int]):
-    wp.atomic_add(out_counts, cells[first + wp.tid()], 1)
+def _count(cells: wp.array[int], out_counts: wp.array[int]):
+    wp.atomic_add(out_counts, cells[wp.tid()], 1)
 
 
 @wp.kernel
-def _add_shares(counts: wp.array2d[int], out_total: wp.array[int]):
-    cell = wp.tid()
-    total = int(0)
+def _mark(counts: wp.array2d[int], in_voxel: int, out_is_used: wp.array[int]):
+    voxel = wp.tid()
     for share in range(counts.shape[0]):
-        total += counts[share, cell]
-    out_total[cell] = total
+        for cell in range(voxel * in_voxel, (voxel + 1) * in_voxel):
+            if counts[share, cell] > 0:
+                out_is_used[voxel] = 1
 
 
 @wp.kernel
-def _begin_shares(starts: wp.array[int], counts: wp.array2d[int]):
+def _add_shares(counts: wp.array2d[int], bricks: wp.array[int], in_voxel: int, out_total: wp.array[int]):
+    voxel = wp.tid()
+    if bricks[voxel] >= 0:
+        for cell in range(in_voxel):
+            total = int(0)
+            for share in range(counts.shape[0]):
+                total += counts[share, voxel * in_voxel + cell]
+            out_total[bricks[voxel] * in_voxel + cell] = total
+
+
+@wp.kernel
+def _begin_shares(starts: wp.array[int], bricks: wp.array[int], in_voxel: int, counts: wp.array2d[int]):
     """Compute for each share of the segments where its entries begin in each cell.
 
     Entries of earlier shares come first.
     """
-    cell = wp.tid()
-    at = starts[cell]
-    for share in range(counts.shape[0]):
-        count = counts[share, cell]
-        counts[share, cell] = at
-        at += count
-
-
-@wp.kernel
-def _put(
-    cells: wp.array[int],
-    segments: wp.array[int],
-    lines: wp.array[wp.uint32],
-    first: int,
-    ends: wp.array[int],
-    out_segments: wp.array[int],
-    out_lines: wp.array[wp.uint32],
-):
-    """Write each entry to the next place of its cell, on one CPU core, so that entries stay in order."""
-    entry = first + wp.tid()
-    cell = cells[entry]
-    at = ends[cell]
-    ends[cell] = at + 1
-    out_segments[at] = segments[entry]
-    out_lines[2 * at] = lines[2 * entry]
-    out_lines[2 * at + 1] = lines[2 * entry + 1]
+    voxel = wp.tid()
+    if bricks[voxel] >= 0:
+        for cell in range(in_voxel):
+            at = starts[bricks[voxel] * in_voxel + cell]
+            for share in range(counts.shape[0]):
+                count = counts[share, voxel * in_voxel + cell]
+                counts[share, voxel * in_voxel + cell] = at
+                at += count
 
 
 @wp.kernel
@@ -344,31 +354,73 @@ def build(
         hair.points, hair.radii, hair.strands, hair.radius = points, radii, strands, radius
         hair.corner, hair.voxel, hair.shape = wp.vec3(*corner.tolist()), side, wp.vec3i(*shape)
         hair.along_voxel = along_voxel
-        segment_count, voxel_count = max(len(points) - 1, 0), int(np.prod(shape))
-        none, no_lines = wp.empty(1, dtype=int), wp.empty(2, dtype=wp.uint32)
-        is_used, counts = wp.zeros(voxel_count, dtype=int), wp.empty(segment_count, dtype=wp.int64)
-        _by_segments(hair, [1, none, counts, is_used, none, none, no_lines])
-        ends, count = running_sums.ends_of(counts)
-        if count > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
-            raise HairError("Strands are too wide for light among them: use dual scattering.")
-        numbers, brick_count = running_sums.ends_of(is_used)
-        bricks = wp.empty(voxel_count, dtype=int)
-        kernel_cache.launch(_number, voxel_count, [is_used, numbers], [bricks], device)
-        # Sorting on a GPU takes twice the memory.
-        cells = parallel.empty(count if device.is_cpu else 2 * count, int, device)
-        segments, lines = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
-        _by_segments(hair, [0, bricks, ends, none, cells, segments, lines])
-        by_cell = _sorted_by_cores if device.is_cpu else _sorted
-        found = by_cell(cells, brick_count * along_voxel**3, segments, lines)
-        return StrandCells(along_voxel, radius, bricks, *found)
+        voxel_count = int(np.prod(shape))
+        found = (_by_cores if device.is_cpu else _by_sorting)(hair, voxel_count)
+        return StrandCells(along_voxel, radius, *found)
 
 
-def _by_segments(hair, given):
-    """Launch `_find` for all segments."""
-    count, device = max(len(hair.points) - 1, 0), hair.points.device
+def _find_all(hair, inputs, outputs):
+    """Launch `_find` for all segments; outputs: lists of its last arguments for each share of the segments."""
+    count = max(len(hair.points) - 1, 0)
     if count:
-        parts = parallel.part_count(count, device, _LEAST_SEGMENTS)
-        parallel.launch_shares(_find, count, [hair, *given], [[] for _ in range(parts)], device)
+        parallel.launch_shares(_find, count, [hair, *inputs], outputs, hair.points.device)
+
+
+def _require_room(count):
+    if count > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
+        raise HairError("Strands are too wide for light among them: use dual scattering.")
+
+
+def _numbered(is_used):
+    """Return (bricks (V,) of voxels with flags (V,), number of bricks)."""
+    device = is_used.device
+    numbers, count = running_sums.ends_of(is_used)
+    bricks = wp.empty(len(is_used), dtype=int, device=device)
+    kernel_cache.launch(_number, len(is_used), [is_used, numbers], [bricks], device)
+    return bricks, count
+
+
+def _nothing(device):
+    """Return arrays of (int, int64, uint32) for the arguments that a step of `_find` does not use."""
+    return tuple(wp.empty(1, dtype=kind, device=device) for kind in (int, wp.int64, wp.uint32))
+
+
+def _by_sorting(hair, voxel_count):
+    """Return the arrays of `StrandCells` of a GPU: all entries are written, and sorted by cell."""
+    device, in_voxel, (none, _, no_lines) = hair.points.device, hair.along_voxel**3, _nothing(hair.points.device)
+    is_used = wp.zeros(voxel_count, dtype=int, device=device)
+    counts = wp.empty(max(len(hair.points) - 1, 0), dtype=wp.int64, device=device)
+    _find_all(hair, [_COUNT, none, counts], [[none, is_used, none, none, no_lines]])
+    ends, count = running_sums.ends_of(counts)
+    _require_room(count)
+    bricks, brick_count = _numbered(is_used)
+    cells = wp.empty(2 * count, dtype=int, device=device)  # sorting takes twice the memory
+    segments, lines = (wp.empty(count, dtype=int, device=device), wp.empty(2 * count, dtype=wp.uint32, device=device))
+    _find_all(hair, [_WRITE, bricks, ends], [[none, none, cells, segments, lines]])
+    return bricks, *_sorted(cells, brick_count * in_voxel, segments, lines)
+
+
+def _by_cores(hair, voxel_count):
+    """Return the arrays of `StrandCells` of a CPU: each core puts a share of the segments at their final places,
+    because new memory takes longer than another search for cells.
+    """
+    device, in_voxel, (none, no_ends, no_lines) = hair.points.device, hair.along_voxel**3, _nothing(hair.points.device)
+    share_count = parallel.share_count(max(len(hair.points) - 1, 0), device, _LEAST_SEGMENTS)
+    counts = wp.zeros((share_count, voxel_count * in_voxel), dtype=int, device=device)
+    shares = [counts[share] for share in range(share_count)]
+    _find_all(hair, [_COUNT_BY_CELL, none, no_ends], [[share, none, none, none, no_lines] for share in shares])
+    count = int(counts.numpy().sum(dtype=np.int64))
+    _require_room(count)
+    is_used = wp.zeros(voxel_count, dtype=int, device=device)
+    kernel_cache.launch(_mark, voxel_count, [counts, in_voxel], [is_used], device)
+    bricks, brick_count = _numbered(is_used)
+    total, starts = (wp.zeros(brick_count * in_voxel + 1, dtype=int, device=device) for _ in range(2))
+    kernel_cache.launch(_add_shares, voxel_count, [counts, bricks, in_voxel], [total], device)
+    wp.utils.array_scan(total, starts, inclusive=False)
+    kernel_cache.launch(_begin_shares, voxel_count, [starts, bricks, in_voxel, counts], device=device)
+    segments, lines = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
+    _find_all(hair, [_PUT, none, no_ends], [[share, none, none, segments, lines] for share in shares])
+    return bricks, starts, segments, lines
 
 
 def _sorted(cells, cell_count, segments, lines):
@@ -380,26 +432,9 @@ def _sorted(cells, cell_count, segments, lines):
     counts, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))
     order = wp.empty(2 * count, dtype=int, device=device)
     found = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
-    kernel_cache.launch(_count, count, [cells, 0], [counts], device)
+    kernel_cache.launch(_count, count, [cells], [counts], device)
     wp.utils.array_scan(counts, starts, inclusive=False)
     kernel_cache.launch(_rise, count, outputs=[order], device=device)
     wp.utils.radix_sort_pairs(cells, order, count, end_bit=max(cell_count - 1, 1).bit_length())
     kernel_cache.launch(_take, count, [order, segments, lines], found, device)
-    return starts, *found
-
-
-def _sorted_by_cores(cells, cell_count, segments, lines):
-    """Return the result of `_sorted` on a CPU: each core writes a share of the segments to their cells."""
-    device, count = cells.device, len(segments)
-    counts = wp.zeros((parallel.share_count(count, device, _LEAST_SEGMENTS), cell_count + 1), dtype=int, device=device)
-    total, starts = (wp.zeros(cell_count + 1, dtype=int, device=device) for _ in range(2))
-    found = parallel.empty(count, int, device), parallel.empty(2 * count, wp.uint32, device)
-    if count:
-        shares = [counts[share] for share in range(len(counts))]
-        parallel.launch_shares(_count, count, [cells], [[share] for share in shares], device)
-        kernel_cache.launch(_add_shares, cell_count + 1, [counts], [total], device)
-        wp.utils.array_scan(total, starts, inclusive=False)
-        kernel_cache.launch(_begin_shares, cell_count + 1, [starts, counts], device=device)
-        given = [cells, segments, lines]
-        parallel.launch_shares(_put, count, given, [[share, *found] for share in shares], device)
     return starts, *found

@@ -63,23 +63,15 @@ def test_strands_in_another_order_are_in_the_same_cells(rng):
 
 
 def test_a_gpu_sorts_as_cores_do(rng, monkeypatch):
-    """A GPU sorts as cores do: both sorts on the processor give the same lists to the bit, on any number of cores."""
+    """A GPU sorts as cores do: both ways on the processor give the same lists to the bit, on any number of cores."""
     points, radii = mixed_strands(rng, 300)
     lists = []
-    for name, share in (("_sorted", 1), ("_sorted_by_cores", 1), ("_sorted_by_cores", 5)):
-        by_cell = getattr(strand_cells, name)
+    for name, share in (("_by_sorting", 1), ("_by_cores", 1), ("_by_cores", 5)):
         monkeypatch.setattr(strand_cells.parallel, "share_count", lambda *_, share=share: share)
-        with monkeypatch.context() as short:
-            short.setattr(strand_cells, "_sorted_by_cores", lambda cells, *rest, by=by_cell: by(twice(cells), *rest))
+        with monkeypatch.context() as chosen:
+            chosen.setattr(strand_cells, "_by_cores", getattr(strand_cells, name))
             cells = grid_of(points, WHITE, radii, voxel_count=500).cells
-        lists.append([array.numpy() for array in (cells.starts, cells.segments, cells.lines)])
+        lists.append([array.numpy() for array in (cells.bricks, cells.starts, cells.segments, cells.lines)])
     for found in lists[1:]:
         for values, expected in zip(found, lists[0], strict=True):
             np.testing.assert_array_equal(values, expected)
-
-
-def twice(cells):
-    """Return cells in an array of twice their number, as a radix sort takes them."""
-    room = strand_cells.wp.zeros(2 * len(cells), dtype=int, device="cpu")
-    strand_cells.wp.copy(room, cells, count=len(cells))
-    return room
