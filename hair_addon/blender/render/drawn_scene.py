@@ -52,6 +52,7 @@ class DrawnScene:
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
+    is_draft: bool = False  # whether hair was about to change again
     has_exact_boxes: bool = True  # whether shadow maps were drawn for the exact boxes of strands
     light: viewport_shading.ViewportLight = viewport_shading.SCENE_LIGHT
     is_wire: bool = False  # whether strands are thin lines
@@ -177,7 +178,7 @@ def read(
     last = before or (former if are_made else None)
     is_draft = is_draft or (former is not None and are_made)
     # Only in a row of edits may the boxes of the hair before stand for those of hair that the GPU still makes.
-    if former is not None or not is_draft or last is None or last.renewal is None:
+    if not (is_draft and before is not None and before.is_draft):
         for strands, *_rest in hair:
             strands.box.require()
     if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
@@ -204,7 +205,7 @@ def read(
     are_exact = all(strands.box.is_exact for strands, *_rest in hair)
     (hair_seen, surfaces_seen), renewal = _visibility_since(last if is_draft else None, drawn, are_made)
     seen = {"hair_visibility": hair_seen, "surface_visibility": surfaces_seen, "renewal": renewal}
-    return replace(drawn, **seen, has_exact_boxes=are_exact)
+    return replace(drawn, **seen, is_draft=is_draft, has_exact_boxes=are_exact)
 
 
 def has_room(drawn):

@@ -37,7 +37,7 @@ MOST_AT_ONCE = 1 << 16
 # Maximum number of points that are kept between styles while a slider moves: 256 MiB.
 MOST_KEPT = 1 << 24
 
-_GROUP_SIZE = 64
+_GROUP_SIZE = 32  # on an H200 styles take 1.2 ms for 65,000 strands, 1.7 ms with 64 and 2.4 ms with 128
 
 
 def can_style(styling: "Styling") -> bool:
