@@ -404,10 +404,10 @@ def _together(parts):
     counted records)].
     """
     places = np.repeat([place for place, _records, _counted in parts], [len(records) for _p, records, _c in parts])
-    bounding = strand_batches.Objects(uniforms.joined([records for _p, records, _c in parts]), places, 0)
+    bounding = strand_batches.shared_objects(uniforms.joined([records for _p, records, _c in parts]), places)
     counting = bounding
     if any(counted is not records for _place, records, counted in parts):
-        counting = strand_batches.Objects(uniforms.joined([counted for _p, _r, counted in parts]), places, 0)
+        counting = strand_batches.shared_objects(uniforms.joined([counted for _p, _r, counted in parts]), places)
     return _block_of({place: records[0] for place, records, _counted in parts}), bounding, counting
 
 

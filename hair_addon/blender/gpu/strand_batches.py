@@ -11,6 +11,7 @@ import gpu
 import numpy as np
 
 from ...core.texture_sides import avoid_powers_of_two
+from ..host.caches import Cache
 from . import drawing
 from .hair_shading import MixedShading, Shading
 from .programs import scene_programs
@@ -107,6 +108,16 @@ class Objects:
         drawing.provide(program, blocks, {**drawing.strand_samplers(strands), "objects": self.texture})
         drawing.set_integers(program, constants | {"object_count": self.count})
         run_for_each(program, int(self._group_counts[part]), 1)
+
+
+# (Bytes of records, of layers) → `Objects` of shadow maps, most of which equal those of the last frame.
+objects_cache = Cache(capacity=64)
+
+
+def shared_objects(records: np.ndarray, layers: np.ndarray) -> Objects:
+    """Return the shared `Objects` without tints of records and layers, with no runs before them."""
+    key = records.tobytes(), layers.tobytes()
+    return objects_cache.get(key, lambda: Objects(records, layers, 0))
 
 
 def _halves(numbers):
