@@ -368,7 +368,7 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
     assert calls == [many, few]
     calls.clear()
     maps.draw(lights, hair, [], steps, counted=20)
-    assert len(tables) == 3 * 2  # others for the counted strands
+    assert len(tables) == 2 * 2  # others for the counted strands, and the same for all strands
     assert calls == [many, few]
     maps.draw(lights, hair, [], steps, lambda index: (hair[:2] if index == 1 else hair, []), counted=20)
     assert calls == [many, few] * 2 + [many]
