@@ -34,7 +34,7 @@ from . import (
     stale_marks,
     stored_guide_maps,
     stroke_limits,
-    stroke_ties,
+    strokes,
     unbaked_renders,
     unlocked_renders,
     updates,
@@ -176,8 +176,7 @@ def _follow_geometry(changed, depsgraph):
         if isinstance(datablock, bpy.types.Curves):
             events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and last_update.have_guides_moved(datablock):
-                stroke_ties.follow(datablock, depsgraph)
-                combed[datablock] = stroke_limits.limited(datablock, last_update.points_of(datablock), depsgraph)
+                combed[datablock] = strokes.follow(datablock, depsgraph)
     return combed
 
 

@@ -50,6 +50,7 @@ from . import (
     moving_surfaces,
     refused_hair,
     simulated_hair,
+    strokes,
     unlocked_renders,
 )
 
@@ -125,6 +126,7 @@ OTHERS = (
     dynamics_state.change_cache,
     simulated_hair.before_cache,
     unlocked_renders.noted_cache,
+    strokes.result_cache,
     composite.refused_cache,
     refused_hair.noted_cache,
     frame_folders.folder_cache,

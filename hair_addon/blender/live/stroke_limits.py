@@ -29,19 +29,29 @@ def limited(guides, points, depsgraph):
         allowed = frozen_points.restored(guides, former, pushed)
     if allowed is points:
         return points
-    attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", allowed)
-    guides.update_tag()
-    last_update.note_points(guides, allowed)
+    write(guides, allowed)
     return allowed
+
+
+def write(guides, points):
+    """Write points (N, 3) of guides, which do not count as moved."""
+    attributes.write(guides, "position", "FLOAT_VECTOR", "POINT", points)
+    guides.update_tag()
+    last_update.note_points(guides, points)
+
+
+def is_combed(guides):
+    """Whether guides of this file are in a mode in which they are combed."""
+    if attributes.is_from_library(guides):
+        return False
+    return any(user.data == guides and user.mode in _MODES for user in bpy.data.objects)
 
 
 def _is_edited(guides, points):
     """Return whether an artist moved limited guides to points (N, 3), and no setting or layer did."""
     if not guides.vellus.keeps_outside and frozen_points.FROZEN not in guides.attributes:
         return False
-    if attributes.is_from_library(guides):
-        return False
-    if not any(user.data == guides and user.mode in _MODES for user in bpy.data.objects):
+    if not is_combed(guides):
         return False
     if len(guides.vellus.layers):
         return recording.is_edited(guides, points)

@@ -212,6 +212,26 @@ def test_undone_guides_are_not_pushed(guides):
     assert np.array_equal(points(found), inside)
 
 
+def test_undo_and_redo_in_edit_mode_restore_what_was_shown(guides):
+    """Blender's steps of Edit Mode hold guides before they are pushed outside, and before frozen points return."""
+    found, hair = guides, bpy.data.objects["Hair"]
+    frozen_points.write(found.data, np.tile(np.arange(41) < 5, 60))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    enter(found, "EDIT")
+    bpy.ops.curves.select_all("EXEC_DEFAULT", True, action="SELECT")
+    shown = []
+    for factor in (0.9, 0.8, 0.9):
+        bpy.ops.transform.resize("EXEC_DEFAULT", True, value=(factor,) * 3)
+        bpy.context.view_layer.update()
+        shown.append((points(found), points(hair)))
+    assert all(np.array_equal(each[:, :5], shown[0][0][:, :5]) for each, _strands in shown)
+    for step, expected in ((bpy.ops.ed.undo, shown[1]), (bpy.ops.ed.undo, shown[0]), (bpy.ops.ed.redo, shown[1])):
+        step()
+        bpy.context.view_layer.update()
+        for name, wanted in zip(("Guides", "Hair"), expected, strict=True):
+            np.testing.assert_array_equal(points(bpy.data.objects[name]), wanted)
+
+
 def test_a_stroke_reads_only_the_guides_that_it_moves(guides, monkeypatch):
     """At rest, an event of a stroke transforms the points of combed guides alone, however many guides there are."""
     before = comb(guides, points(guides) * np.float32(1.001))  # prepares the surface

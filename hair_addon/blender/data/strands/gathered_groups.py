@@ -82,6 +82,18 @@ def write(datablock, gathered):
         attributes.write(datablock, _LENGTH, *_FLOAT_PER_GUIDE, gathered.held * _lengths(datablock))
 
 
+def ties_of(datablock):
+    """Return the stored ties and lengths up to ties of guides, for `write_ties`."""
+    return [(name, attributes.read(datablock, name, *_FLOAT_PER_GUIDE)) for name in (TIE, _LENGTH)]
+
+
+def write_ties(datablock, ties):
+    """Store ties and lengths from `ties_of`."""
+    for name, values in ties:
+        if values is not None and len(values) == len(datablock.curves):
+            attributes.write(datablock, name, *_FLOAT_PER_GUIDE, values)
+
+
 def scale(datablock, change):
     """Change the stored lengths up to ties as an `Affine` has changed the local coordinates of guides.
 
