@@ -4,8 +4,6 @@
 
 #include "visibility/covered_fraction.glsl"
 
-const int REACH = 2;  // pixels: the color of hair varies less than its coverage
-
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -21,23 +19,25 @@ void main()
     vec4 hair = vec4(0.0);
     vec2 shadow = vec2(0.0);  // of hair on surfaces: sum of alpha, and of weights
     // A loop without turns costs software drivers nothing, unlike a branch.
-    int turns = (bits == 0u && total.a < 1.0) ? 0 : 25;
-    for (int turn = 0; turn < turns; turn++) {
-      ivec2 offset = ivec2(turn % 5, turn / 5) - REACH;
-      vec4 beside = texelFetch(picture, clamp(place + offset, ivec2(0), last), 0);
-      float part = float((REACH + 1 - abs(offset.x)) * (REACH + 1 - abs(offset.y)));
-      if (beside.a == 1.0) {
-        hair += part * beside;
-      }
-      else {
-        // A shadow has edges where its surface ends.
-        shadow += ((offset == ivec2(0)) ? 1e6 : part) * vec2(beside.a, 1.0);
+    int rows = (bits == 0u && total.a < 1.0) ? -1 : int(color_radius);
+    for (int y = -rows; y <= rows; y++) {
+      int columns = int(sqrt(color_radius * color_radius - float(y * y)));
+      for (int x = -columns; x <= columns; x++) {
+        vec4 beside = texelFetch(picture, clamp(place + ivec2(x, y), ivec2(0), last), 0);
+        float part = color_radius * color_radius - float(x * x + y * y);
+        if (beside.a == 1.0) {
+          hair += part * beside;
+        }
+        else {
+          // A shadow has edges where its surface ends.
+          shadow += ((x == 0 && y == 0) ? 1e6 : part) * vec2(beside.a, 1.0);
+        }
       }
     }
-    if (turns > 0) {
+    if (rows >= 0) {
       float fraction = (hair.a > 0.0) ? covered_fraction(bits) : 0.0;
-      total = hair * (fraction / max(hair.a, 1.0));
-      total.a += (1.0 - fraction) * shadow.x / max(shadow.y, 1.0);
+      total = hair * (fraction / max(hair.a, 1e-6));
+      total.a += (1.0 - fraction) * shadow.x / max(shadow.y, 1e-6);
     }
   }
   imageStore(first_picture, pixel, total);

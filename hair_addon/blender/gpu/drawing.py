@@ -22,13 +22,15 @@ from .strand_textures import bare_vertices, run_for_each, vertex_count
 class Steps:
     """Level of detail: the number of points drawn per strand, the number of strands drawn, and the first index.
 
-    Both numbers may be arrays (N,), for N linked hair objects; thickness: factor of the strands' width.
+    Both numbers may be arrays (N,), for N linked hair objects; thickness: factor of the strands' width; most_strands:
+    maximum number of strands with any level of detail, None for all.
     """
 
     point_count: int | np.ndarray | None = None
     strand_count: int | np.ndarray | None = None
     first_strand: int = 0
     thickness: float = 1.0
+    most_strands: int | None = None
 
 
 _ALL = Steps()

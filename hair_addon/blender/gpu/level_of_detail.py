@@ -50,8 +50,9 @@ def steps_of(hair, view):
 def _steps(strands, to_world, limits, view):
     """Return the `drawing.Steps` of a hair."""
     count, part = strands.strand_count, limits.part
+    most = max(int(count * part), 1)
     if not limits.is_reduced:
-        return drawing.Steps(None, max(int(count * part), 1))
+        return drawing.Steps(None, most, most_strands=most)
     samples_per_unit, diameters = _sizes_in(view, strands, to_world)
     samples_per_meter = samples_per_unit * drawing.scales_of(to_world)
     most_widths = np.minimum(_FULL_WIDTH, np.maximum(_WIDTH_PART * diameters, _LEAST_WIDTH))
@@ -65,7 +66,7 @@ def _steps(strands, to_world, limits, view):
     point_counts = np.where(strand_counts < count, fewest, point_counts)
     # With a limit by the artist each pass draws the same strands.
     first = int(float(view["coverage_turn"]) % 1.0 * count) if part == 1.0 else 0
-    return drawing.Steps(point_counts, np.maximum(strand_counts, 1), first)
+    return drawing.Steps(point_counts, np.maximum(strand_counts, 1), first, most_strands=most)
 
 
 def points_within(strands, to_world, view, bend):

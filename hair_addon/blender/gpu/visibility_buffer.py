@@ -6,7 +6,7 @@ If the graphics driver supports it, a compute program also finds the nearest seg
 """
 
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 
@@ -23,6 +23,10 @@ NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
 # With fewer, or with shorter segments [samples], occlusion culling takes longer than drawing hidden segments.
 _FEW_SEGMENTS, _SHORT_SEGMENTS = 1 << 20, 2.0 * visibility_programs.TILE
+
+# Number of strands whose coverage is counted per strand that has depths and light: its limits, and the length of
+# strands [samples] that adds one.
+_LEAST_FINER, _MOST_FINER, _FINER_LENGTH = 4.0, 6.0, 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +56,17 @@ class _Placed:
         return strand_batches.Objects(self.records, self.layers, self.first_run, self.tints)
 
     @property
+    def finer(self):
+        """These objects with more, thinner strands of the same area."""
+        records, steps = self.records.copy(), self.batch.steps
+        most = self.batch.strands.strand_count if steps.most_strands is None else steps.most_strands
+        drawn = self.records["drawn_strands"]
+        finer = drawn * np.clip(self._strand_lengths / _FINER_LENGTH, _LEAST_FINER, _MOST_FINER)
+        records["drawn_strands"] = np.maximum(np.minimum(finer, most), drawn)
+        records["thickness"] *= drawn / records["drawn_strands"]
+        return replace(self, records=records)
+
+    @property
     def window(self):
         """The window around all objects."""
         low = self.windows[:, :2].min(axis=0)
@@ -67,13 +82,24 @@ class _Placed:
     @property
     def total_length(self):
         """Length of all drawn segments seen from the side [samples]; infinite for hair around the viewer."""
+        return float((self.records["drawn_strands"] * self._strand_lengths).sum())
+
+    @property
+    def smooth_length(self):
+        """Length [samples] over which the mean color of hair changes: that of strands, if each represents many."""
+        parts_left = 1.0 - self.records["drawn_strands"] / self.batch.strands.strand_count
+        lengths = np.zeros(len(parts_left))
+        np.multiply(parts_left, self._strand_lengths, out=lengths, where=parts_left > 0.0)
+        return float(lengths.min())
+
+    @property
+    def _strand_lengths(self):
+        """(N,) mean lengths of strands seen from the side [samples]; infinite for hair around the viewer."""
         records, bounds = self.records, self.batch.strands.box.likely
         middle = np.append(0.5 * bounds.sum(axis=0, dtype=np.float64), 1.0)
         depths = records["object_to_clip"].transpose(0, 2, 1)[:, 3] @ middle
-        if (depths <= 0.0).any():
-            return np.inf
-        per_unit = records["pixels_per_unit"] * records["object_scale"] / depths
-        return float((records["drawn_strands"] * per_unit).sum() * self.batch.strands.mean_length)
+        per_unit = records["pixels_per_unit"] * records["object_scale"] * self.batch.strands.mean_length
+        return np.divide(per_unit, depths, out=np.full(len(records), np.inf), where=depths > 0.0)
 
     @property
     def run_count(self):
@@ -293,6 +319,11 @@ class VisibilityBuffer:
             self._shade(placed, picture)
 
     @property
+    def smooth_length(self):
+        """The least length [samples] over which the mean color of a hair changes."""
+        return min((placed.smooth_length for placed in self._hair), default=0.0)
+
+    @property
     def segment_ranges(self):
         """[(first, count)] of the segments of each hair in the last `find_hair`."""
         return list(zip(self._firsts.tolist(), self._counts.tolist(), strict=True))
@@ -410,10 +441,11 @@ class VisibilityBuffer:
         count = sum(placed.segment_count for placed in self._hair)
         length = sum(placed.total_length for placed in self._hair)
         if count < _FEW_SEGMENTS or length < _SHORT_SEGMENTS * count:
-            if is_counted:
-                self._clear_covered()
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
+            if is_counted:
+                self._clear_covered()
+                self._find_parts(clipping)
             return
         # A few strands occlude most of the others.
         self._walk(all_blocks, drawing.WALK_FIRST, is_depth=True)
@@ -443,14 +475,11 @@ class VisibilityBuffer:
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
-        samplers, is_counted = {"farthest_depths": self._farthest}, is_depth and self.covered is not None
-        if is_counted:
-            images, samplers = images | {"covered": self.covered}, samplers | {"surface_depth": self.surface_depth}
-        shared = samplers, images, {"are_tiles_known": int(are_tiles_known)}, part
+        shared = {"farthest_depths": self._farthest}, images, {"are_tiles_known": int(are_tiles_known)}, part
         drawn, is_clipped = zip(self._hair, all_blocks, strict=True), self._clip_planes is not None
         for kind, some in groupby(drawn, key=lambda one: (one[0].is_round, one[0].objects is not None)):
             is_round, is_batch = kind
-            program = scene_programs.segments_program(is_depth, is_round, is_clipped, is_batch, is_counted)
+            program = scene_programs.segments_program(is_depth, is_round, is_clipped, is_batch)
             with drawing.rasterizing(program, {}, *shared):
                 for placed, blocks in some:
                     strands, first_run = placed.batch.strands, {"first_run": placed.first_run}
@@ -458,6 +487,19 @@ class VisibilityBuffer:
                         placed.objects.rasterize(strands, program, blocks, {}, part)
                     else:
                         drawing.rasterize_strands(strands, program, placed.records[0], blocks, first_run, part)
+
+    def _find_parts(self, clipping):
+        """Fill `covered` after `depths`; clipping: of `uniforms.clipping_blocks`."""
+        images, samplers = {"depths": self.depths, "covered": self.covered}, {"surface_depth": self.surface_depth}
+        for placed in self._hair:
+            finer, is_batch = placed.finer, placed.layers is not None
+            program = scene_programs.parts_program(finer.is_round, self._clip_planes is not None, is_batch)
+            blocks = {"shared_view" if is_batch else "view": finer.view, "lights": finer.lights} | clipping
+            with drawing.rasterizing(program, {}, samplers, images, {}):
+                if is_batch:
+                    finer.objects.rasterize(placed.batch.strands, program, blocks, {})
+                else:
+                    drawing.rasterize_strands(placed.batch.strands, program, finer.records[0], blocks, {})
 
     def nearest_depths(self):
         """`depths` of hair, and of surfaces elsewhere."""

@@ -173,6 +173,20 @@ def test_counted_parts_of_samples_are_those_that_strands_cover(rng, shading):
         assert filled(*given).covered is None
 
 
+def test_parts_are_counted_of_more_strands_than_are_drawn(rng, shading):
+    """A quarter of the strands, drawn four times as wide, covers what all strands cover, within an artist's limit."""
+    points = rng.uniform(-0.3, 0.3, (64, 2, 3)).astype(np.float32) - [0.0, 0.0, 1.0]
+    strands = [(points.astype(np.float32), np.full((64, 2), 0.1 * 0.4 / SIZE[1], np.float32), np.eye(4))]
+
+    def parts(**steps):
+        buffer = filled(strands, PARALLEL, shading, True, steps=drawing.Steps(**steps), is_counted=True)
+        return np.array(buffer.covered.read(), np.uint32)
+
+    assert parts().any()
+    np.testing.assert_array_equal(parts(strand_count=16), parts())
+    assert (parts(strand_count=16, most_strands=16) != parts()).any()
+
+
 def test_parts_are_counted_of_strands_whose_axis_is_in_a_surface(shading):
     """Strands are round: their sides that face the viewer are in front, and seen."""
     points = np.zeros((1, 2, 3), np.float32)

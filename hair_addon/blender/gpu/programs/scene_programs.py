@@ -120,22 +120,29 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/visibility/rasterize_
 
 
 @cached
-def segments_program(is_depth, is_round, is_clipped=False, is_batch=False, is_counted=False):
+def segments_program(is_depth, is_round, is_clipped=False, is_batch=False):
     """Return the compute program that draws strands as samples of a picture: see visibility/strand_segments.comp.
 
-    is_batch: of linked hair objects; is_counted: also find the parts of samples that strands cover, see
-    visibility/covered_parts.glsl.
+    is_batch: of linked hair objects.
     """
     images, constants = ("depths", "segments", "seen_runs"), ("are_tiles_known",)
     defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
-    counting = {}
-    if is_counted:
-        images, samplers = (*images, "covered"), (*samplers, ("surface_depth", "FLOAT_2D"))
-        counting["visibility/uncounted.glsl"] = "visibility/covered_parts.glsl"
-    options = {"samplers": samplers, "is_clipped": is_clipped, "is_batch": is_batch, "counting": counting}
+    options = {"samplers": samplers, "is_clipped": is_clipped, "is_batch": is_batch}
     if not is_batch:
         constants = ("first_run", *constants)
     return _walk("visibility/strand_segments.comp", images, defined, constants, **options)
+
+
+@cached
+def parts_program(is_round, is_clipped=False, is_batch=False):
+    """Return the compute program that finds the parts of samples that strands cover: see visibility/strand_parts.comp.
+
+    is_batch: of linked hair objects.
+    """
+    options = {"samplers": (("surface_depth", "FLOAT_2D"),), "is_clipped": is_clipped, "is_batch": is_batch}
+    counting = {"visibility/uncounted.glsl": "visibility/covered_parts.glsl"}
+    defined, images = {"IS_ROUND": is_round}, ("depths", "covered")
+    return _walk("visibility/strand_parts.comp", images, defined, **options, counting=counting)
 
 
 @cached
@@ -301,6 +308,7 @@ def first_picture_program():
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     info.push_constant("IVEC2", "first_place")  # origin of the textures in the picture [pixels]
+    info.push_constant("FLOAT", "color_radius")  # of the mean of colors [pixels]
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "covered")
     info.image(0, PICTURE_FORMAT, "FLOAT_2D", "first_picture", qualifiers={"WRITE"})

@@ -22,6 +22,9 @@ _SPREADS, _SPREADS_WITH_HISTORY = (0.25, 0.2, 0.15, 0.1), (0.15,)
 # Share of the first picture in the picture after each pass: its coverage has less noise than that of single samples.
 _FIRST_PARTS = (1.0, 0.55, 0.35, 0.2, 0.1)
 
+# Radius of the first picture's mean of colors [pixels]: limits, and its part of the length over which colors change.
+_RADII, _RADIUS_PART = (2.6, 5.0), 1.0 / 9.0
+
 
 def samples_per_side():
     """Samples along each side of a pixel in each pass: fewer with software rendering, for responsiveness."""
@@ -150,6 +153,7 @@ class HairPicture:
         with drawing.bound(program, {}, samplers):
             program.image("first_picture", self._first_picture)
             program.uniform_int("first_place", self._detail.corner)
+            program.uniform_float("color_radius", np.clip(_RADIUS_PART * self._pass.smooth_length, *_RADII))
             drawing.dispatch_over(program, self.size)
 
     @property

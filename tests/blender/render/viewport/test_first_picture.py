@@ -19,7 +19,7 @@ from tests.support.scenes import COARSE_WORLD, set_world_maps
 
 SIZE = (240, 150)
 HEAD = Path(__file__).resolve().parents[4] / "blend_samples" / "head.obj"
-MOST = {1: 0.09, 2: 0.08}  # FLIP by samples along each side of a pixel
+MOST = {1: 0.082, 2: 0.08}  # FLIP by samples along each side of a pixel
 BACKGROUND, SKIN = 0.22, 0.85  # display values behind hair
 MODES = {
     "solid": {"type": "SOLID", "light": "STUDIO", "studio_light": "Default"},
@@ -106,7 +106,7 @@ LONG = pytest.mark.long  # each takes ten seconds of a core
     [("cube", "lights"), pytest.param("monkey", "solid", marks=LONG), pytest.param("head", "preview", marks=LONG)],
 )
 def test_the_first_picture_looks_like_the_picture_at_rest(name, mode, blender):
-    """The FLIP error on hair is at most 0.08 with four samples per pixel and 0.09 with one, without specks.
+    """The FLIP error on hair is at most 0.08 with four samples per pixel and 0.082 with one, without specks.
 
     Over light skin, four passes of one sample have at most half as many outliers as one pass of four samples.
     """
