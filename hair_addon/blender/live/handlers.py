@@ -9,8 +9,9 @@ from ..data.maps import strand_maps
 from ..data.strands import curves, curves_objects
 from ..groom import frame_faces, hidden_hair, staleness
 from ..groom.dynamics import frame_folders
+from ..groom.transfer import groom_settings
 from ..host import running, scene_time
-from ..host.notices import name_of
+from ..host.notices import name_of, say
 from ..materials import looks
 from ..render import refused_strands
 from ..render.frames import composite
@@ -399,10 +400,16 @@ def before_rendered_frame(scene, *_args):
 
 @persistent
 def before_saving(*_args):
-    """Store in the file where its baked frames and surfaces are, so that they are found under another file name."""
+    """Store in the file where its baked frames and surfaces are, so that they are found under another file name; report
+    changes that the file does not store.
+    """
     frame_folders.remember()
     for datablock in bpy.data.hair_curves:
         surface_space.remember_place(datablock)
+        if datablock.vellus.kind == "HAIR" and groom_settings.has_unsaved_changes(datablock):
+            sentence = '"{name}" is a library override: the file does not store its other settings. Make it local.'
+            datablock.vellus.status = sentence.format(name=name_of(datablock))
+            say(datablock.vellus.status)
 
 
 @persistent

@@ -103,6 +103,22 @@ def test_what_scripts_set_resizes_no_hair_of_a_library_override(styled, tmp_path
     assert guides.data.vellus.status == '"Guides" keeps the 60 guides of its file: change them there.'
 
 
+def test_what_scripts_set_in_a_library_override_is_reported_when_a_file_is_saved(styled, tmp_path, capsys):
+    """Blender does not save settings of a library override, so the next file has the hair of before."""
+    override(styled, tmp_path)
+    _sphere, guides, hair = parts()
+    guides.data.vellus.dynamics.damping = 0.7  # is saved
+    bpy.ops.wm.save_mainfile()
+    assert "does not store" not in capsys.readouterr().err and hair.data.vellus.status == ""
+    before, hair.data.vellus.styles[1].curl.radius = points(hair), 0.06
+    update()
+    changed = points(hair)
+    reopen(tmp_path)
+    assert '"Hair" is a library override: the file does not store its other settings.' in capsys.readouterr().err
+    reopened = points(parts()[2])
+    assert np.abs(changed - before).max() > 0.01 and np.abs(reopened - before).max() < 1e-5
+
+
 def test_a_library_override_is_read_drawn_and_given_to_other_meshes(styled, tmp_path):
     override(styled, tmp_path)
     sphere, guides, hair = parts()

@@ -2,10 +2,12 @@
 """Hair ↔ all of its settings, as `settings_file.GroomSettings`."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bpy.types import Curves, Depsgraph, Object
 
 from ....core.dynamics.rod.settings import DynamicsSettings
+from ....core.errors import HairError
 from ....core.files.settings_file import GroomSettings
 from ....core.grooming.groom import GuideSettings
 from ....core.long_work import Work
@@ -15,7 +17,7 @@ from ....core.shading.appearance import TABLE_FIELDS, Appearance
 from ...data import scene, whole_changes
 from ...data.strands import curves
 from ...materials import looks
-from ...settings import fitted_sizes, map_items, properties, ramp_nodes, setting_properties, style_items
+from ...settings import animated, fitted_sizes, map_items, properties, ramp_nodes, setting_properties, style_items
 from .. import pipeline, size_fitting, writing
 from ..foreign import hand_made_guides
 
@@ -53,6 +55,22 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     assign_dynamics(guides, settings.dynamics)
     style_items.assign(hair.vellus, settings.styles, settings.style_names)
     _assign_shading(hair, settings)
+
+
+def has_unsaved_changes(hair: Curves) -> bool:
+    """Whether settings of a library override differ from those of its file, as after a script: Blender does not save
+    them. Dynamics are saved, and keyed settings are those of the frame.
+    """
+    reference = None if hair.override_library is None else hair.override_library.reference
+    if reference is None or any(
+        one is not None and animated.are_keyed(one) for one in (hair, hair.vellus.guide_curves)
+    ):
+        return False
+    try:
+        own, of_file = (replace(settings_of(one), dynamics=DynamicsSettings()) for one in (hair, reference))
+    except HairError:  # the hair's status says so
+        return False
+    return own != of_file
 
 
 def assign_look(hair: Curves, look: Appearance) -> None:
