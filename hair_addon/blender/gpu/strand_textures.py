@@ -314,8 +314,9 @@ def move_strands(strands, moved, points):
     )
     packed = np.empty((len(moved), texel_count, 2), np.float32)
     low, high = geometry.packed_strands.pack(points, packed)
-    strands.box.exact[0] = np.minimum(strands.box.exact[0], low)
-    strands.box.exact[1] = np.maximum(strands.box.exact[1], high)
+    box = strands.box.known  # of strands with current points
+    np.minimum(box[0], low, out=box[0])
+    np.maximum(box[1], high, out=box[1])
     texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
     texels[: len(moved), 0, 0] = moved  # exact in single precision up to 16 million
     texels[: len(moved), 1:] = packed
