@@ -215,10 +215,11 @@ class ShadowMaps:
         """Allocate the images that strands are rasterized into, for at least `count` maps."""
         if count <= self._room:
             return
-        size, self._room, self._is_empty = self._size, count, False
+        size, self._is_empty = self._size, False
         self._fronts, self._backs = (gpu.types.GPUTexture((size, size * count), format="R32UI") for _ in range(2))
         self._row_ends = gpu.types.GPUTexture((size, size * count), format="RG32F")
         self._counts = gpu.types.GPUTexture((4 * size, size * count), format="R32UI") if self._in_compute else None
+        self._room = count  # last, in case memory is short
 
     def _walk(self, maps, lights):
         """Draw maps of strands by compute programs, with integer sums that do not depend on the order.

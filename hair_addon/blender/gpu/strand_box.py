@@ -28,7 +28,7 @@ class StrandBox:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the other boxes are exact too."""
+        """Whether `likely` and `loose` are the exact box."""
         return self.known is not None or self.former is None
 
     @property

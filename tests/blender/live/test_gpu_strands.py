@@ -124,6 +124,24 @@ def test_settings_of_weights_are_followed_where_strands_are_drawn(watched, setti
     assert on_gpu.greatest_radius == radii.max()
 
 
+def test_the_processor_moves_strands_that_the_gpu_made(watched, monkeypatch):
+    """After the GPU is no longer chosen, the processor moves strands whose box nothing has read yet."""
+    comb(60, along=(0.3, 0.0, 0.0))
+    drawn(watched)
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    drawn(watched)
+    monkeypatch.setattr(gpu_strands, "are_wanted", lambda: False)
+    hair_cache.choose_makers()
+    on_gpu, calls = hair_cache.strands_on_gpu(watched.data), counts_of(monkeypatch)
+    assert on_gpu.has_points and on_gpu.box.known is None
+    comb(1)
+    shown = drawn(watched).reshape(-1, 3)
+    assert calls["moves"] == 1
+    low, high = hair_cache.strands_on_gpu(watched.data).box.exact
+    assert (low <= shown.min(axis=0) + 2e-6).all() and (shown.max(axis=0) - 2e-6 <= high).all()
+
+
 def test_settings_of_roots_are_not(watched, monkeypatch):
     calls = counts_of(monkeypatch)
     watched.data.vellus.hair.neighbour_limit = 16  # more than were found
