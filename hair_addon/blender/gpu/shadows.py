@@ -90,6 +90,7 @@ class ShadowMaps:
         lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
             return
+        strand_batches.make_room(len({id(strands) for strands, _to_world in hair}))
         draw = partial(self._draw, lights, hair, surfaces, steps, casters, is_steady, chosen, counted)
         is_kept, before = is_steady and self._sphere is not None, self._sphere
         is_drawn = is_kept and any(strands.box.is_pending for strands, _to_world in hair)

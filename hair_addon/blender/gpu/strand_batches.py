@@ -113,6 +113,14 @@ class Objects:
 # (Bytes of records, of layers) → `Objects` of shadow maps, most of which equal those of the last frame.
 objects_cache = Cache(capacity=64)
 
+# `Objects` of a hair in a frame: all and counted strands for each eight of 16 lights, and the visibility of the world.
+_OBJECTS_OF_HAIR = 5
+
+
+def make_room(count: int) -> None:
+    """Keep the `Objects` of `count` hair systems, which are read in turn."""
+    objects_cache.make_room(_OBJECTS_OF_HAIR * count)
+
 
 def shared_objects(records: np.ndarray, layers: np.ndarray) -> Objects:
     """Return the shared `Objects` without tints of records and layers, with no runs before them."""

@@ -410,6 +410,18 @@ def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, r
     assert [layer[..., :2].any() for layer in textures[0][10:]] == [index % 4 > 0 for index in range(10)]
 
 
+def test_frames_with_much_hair_share_their_tables_of_objects(scene, rng, monkeypatch):
+    """The next frame with the same hair makes no table of objects again, however much hair there is."""
+    points, radii = tuft(rng, 2)
+    places = [np.diag([1.0 + index, 1.0, 1.0, 1.0]) for index in range(80)]
+    hair = [(strand_textures.upload_strands(points, radii), place) for place in places]
+    tables, objects = [], strand_batches.Objects
+    monkeypatch.setattr(strand_batches, "Objects", lambda *given: tables.append(1) or objects(*given))
+    for _frame in range(2):
+        shadows.ShadowMaps(16, 1, in_compute=True).draw(sun(0.4, 0.7), hair, [], counted=1)
+        assert len(tables) == 2 * 80  # of all strands, and of the counted strands
+
+
 def layer_of(texture, layer):
     """Return (height, width, 4) of a layer of an array texture."""
     framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
