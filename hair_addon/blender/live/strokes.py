@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What follows each event of a stroke: ties stay where they are, then limits move points back.
+"""What follows each event of a stroke: limits move points back, then ties stay where they are on the guides.
 
 Undo steps of Edit Mode contain guides as they were before that, so the results are kept, and written again after undo.
 """
@@ -23,8 +23,8 @@ def follow(guides, depsgraph):
         return points
     if last_update.former_points_of(guides) is None:
         return _again(guides, points, depsgraph)
-    have_ties_moved = _follow_ties(guides, depsgraph)
     allowed = stroke_limits.limited(guides, points, depsgraph)
+    have_ties_moved = _follow_ties(guides, points, depsgraph)
     if have_ties_moved or allowed is not points:
         rows = np.flatnonzero((allowed != points).any(axis=1))
         ties = gathered_groups.ties_of(guides) if have_ties_moved else None
@@ -49,10 +49,13 @@ def _again(guides, points, depsgraph):
     return allowed
 
 
-def _follow_ties(guides, depsgraph):
-    """Keep ties where they are on guides that a stroke has cut or lengthened; returns whether any tie has changed."""
-    are_gathered = gathered_groups.NAME in guides.attributes
-    if not are_gathered or not gathered_groups.follow_stroke(guides, last_update.former_points_of(guides)):
+def _follow_ties(guides, moved, depsgraph):
+    """Keep ties where they are on guides that a stroke has cut or lengthened; returns whether any tie has changed.
+
+    moved: (N, 3) points before limits.
+    """
+    former = last_update.former_points_of(guides)
+    if gathered_groups.NAME not in guides.attributes or not gathered_groups.follow_stroke(guides, former, moved):
         return False
     _mark_parted(guides, depsgraph)
     return True

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix, Vector
 
 from hair_addon import api
-from hair_addon.blender.data.strands import curves, gathered_groups
+from hair_addon.blender.data.strands import curves, frozen_points, gathered_groups
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.groom.guides import gathered_guides
 from hair_addon.core.errors import HairError
@@ -164,6 +164,28 @@ def test_ties_stay_where_they_are_if_brushes_change_lengths(guides, is_scaled):
     np.testing.assert_allclose(now[is_held], scale * held[is_held], rtol=0.02)
     anew = pipeline.bind_hair(*pipeline.inputs_of(bpy.data.objects["Hair"].data), bpy.context.evaluated_depsgraph_get())
     np.testing.assert_allclose(points(bpy.data.objects["Hair"]), anew.points, atol=1e-5)
+
+
+def test_ties_stay_on_frozen_guides_that_brushes_would_cut(guides):
+    """Frozen points return after each event, so ties follow guides as they are then."""
+    add_line()
+    api.change_guides(guides, "LENGTH", method="SET", length=6.0)
+    gather(guides, shape="BRAID")
+    before, own = tie_lengths(guides), points(guides)
+    fractions, held = gathered_groups.tie_fractions_of(guides.data), gathered_groups.read(guides.data).held
+    are_frozen = np.arange(len(own)) % 2 == 0
+    frozen_points.write(guides.data, np.repeat(are_frozen, own.shape[1]))
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    bpy.context.view_layer.update()
+    lengths = 0.8 * segments(own).sum(axis=1)
+    write_points(guides, np.stack([resampled(line, length) for line, length in zip(own, lengths, strict=True)]))
+    bpy.context.view_layer.update()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    np.testing.assert_array_equal(points(guides)[are_frozen], own[are_frozen])
+    np.testing.assert_allclose(tie_lengths(guides), before, rtol=0.02)
+    np.testing.assert_allclose(gathered_groups.tie_fractions_of(guides.data)[are_frozen], fractions[are_frozen])
+    np.testing.assert_allclose(gathered_groups.read(guides.data).held[are_frozen], held[are_frozen], rtol=1e-6)
 
 
 def test_ties_of_guides_with_fewer_points_than_strands(guides):

@@ -124,15 +124,18 @@ def follow_lengths(datablock, before, cuts):
     _follow(datablock, before, lambda former, present: (_along(present)[:, -1] < _along(former)[:, -1]) & cuts)
 
 
-def follow_stroke(datablock, before):
+def follow_stroke(datablock, before, moved):
     """Update ties as `follow_lengths` after a brush that may have cut, extended or scaled guides; returns whether any
     guide has another tie or length up to it.
 
-    before: (N, 3), their local points before the stroke's last event.
+    before: (N, 3), their local points before the stroke's last event; moved: (N, 3), where the brush has moved them,
+    and limits may have moved them back since.
     """
-    if groups_of(datablock) is None or len(before) != len(datablock.points):
+    if groups_of(datablock) is None or not len(before) == len(moved) == len(datablock.points):
         return False
-    return _follow(datablock, before, _is_extended_or_cut, _LEAST_CHANGE)
+    return _follow(
+        datablock, before, lambda former, _now: _is_extended_or_cut(former, _even(datablock, moved)), _LEAST_CHANGE
+    )
 
 
 def _is_extended_or_cut(former, present):
