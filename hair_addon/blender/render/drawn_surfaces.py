@@ -58,7 +58,8 @@ def upload(meshes, is_shaded, has_paths):
     is_shaded: whether Vellus shades surfaces; has_paths: whether light paths may be traced against them.
     """
     uploaded, blockers, twins = {False: [], True: []}, [], {}
-    surface_textures.surface_cache.make_room(len(meshes))
+    for cache in (surface_textures.surface_cache, surface_textures.posed_cache):
+        cache.make_room(len(meshes))
     surface_shading.baked_cache.make_room(
         2 * sum(material.is_baked for mesh in meshes for _n, material in mesh.materials)
     )

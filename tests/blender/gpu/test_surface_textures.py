@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawn meshes on the GPU: uploads after changes, and the effect of an object's matrix."""
 
+from dataclasses import replace
+
 import bpy
 import gpu
 import numpy as np
@@ -42,6 +44,16 @@ def floats(monkeypatch):
 
     monkeypatch.setattr(gpu.types, "Buffer", counted)
     return sent
+
+
+def test_places_of_many_poses_are_kept_until_their_meshes_are_drawn(ball):
+    """Hair uploads the poses of all surfaces of a frame before any of these surfaces is drawn."""
+    (mesh,) = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
+    meshes = [replace(mesh, owner=(uid, 0, ()), vertices=np.float32(uid) * mesh.vertices) for uid in range(1, 41)]
+    drawn_surfaces.upload(meshes, is_shaded=True, has_paths=False)
+    places = [surface_textures.posed_places(one.owner[0], one.vertices) for one in meshes]
+    shown = drawn_surfaces.upload(meshes, is_shaded=True, has_paths=False)["surfaces"]
+    assert [surface.places for surface, _parts in shown] == places
 
 
 def surfaces():
