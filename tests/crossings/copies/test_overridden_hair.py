@@ -119,6 +119,19 @@ def test_what_scripts_set_in_a_library_override_is_reported_when_a_file_is_saved
     assert np.abs(changed - before).max() > 0.01 and np.abs(reopened - before).max() < 1e-5
 
 
+def test_settings_of_local_guides_are_saved_with_a_library_override(styled, tmp_path, capsys):
+    """Hair may be an override while its guides were made local: their settings are in the file."""
+    override(styled, tmp_path)
+    _sphere, guides, hair = parts()
+    guides.data.make_local()
+    guides = hair.data.vellus.guide_curves
+    assert guides.override_library is None and hair.data.override_library is not None
+    guides.vellus.guides.gravity = 0.9
+    update()
+    bpy.ops.wm.save_mainfile()
+    assert "does not store" not in capsys.readouterr().err and hair.data.vellus.status == ""
+
+
 def test_a_library_override_is_read_drawn_and_given_to_other_meshes(styled, tmp_path):
     override(styled, tmp_path)
     sphere, guides, hair = parts()

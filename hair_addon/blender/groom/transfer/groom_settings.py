@@ -59,7 +59,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
 
 def has_unsaved_changes(hair: Curves) -> bool:
     """Whether settings of a library override differ from those of its file, as after a script: Blender does not save
-    them. Dynamics are saved, and keyed settings are those of the frame.
+    them. Dynamics and settings of other guides are saved, and keyed settings are those of the frame.
     """
     reference = None if hair.override_library is None else hair.override_library.reference
     if reference is None or any(
@@ -70,6 +70,9 @@ def has_unsaved_changes(hair: Curves) -> bool:
         own, of_file = (replace(settings_of(one), dynamics=DynamicsSettings()) for one in (hair, reference))
     except HairError:  # the hair's status says so
         return False
+    guides = hair.vellus.guide_curves.override_library
+    if guides is None or guides.reference != reference.vellus.guide_curves:
+        own = replace(own, guides=of_file.guides)
     return own != of_file
 
 
