@@ -128,6 +128,7 @@ class Surface:
         """Return a copy of the surface with its vertices at (V, 3) float32 local positions; has_uvs: keep its UVs."""
         other = replace(self, posed=posed) if has_uvs else replace(self, posed=posed, corner_uvs=None)
         known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
+        known["has_finite_rest"] = self.has_finite_rest  # which only poses need
         other.__dict__.update(known, _turnings=self._turnings, _nearest=self._nearest)  # shared by all poses
         return other
 

@@ -10,6 +10,7 @@ import pytest
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.pictures import drawn_meshes
+from hair_addon.blender.data.strands import posed_strands
 from hair_addon.blender.render import hair_cache
 
 
@@ -118,6 +119,15 @@ def test_surfaces_are_as_if_read_for_the_first_time(ball):
         scene.surface_cache.clear()
         scene.faces_cache.clear()
         assert same_surfaces(again, scene.read_surface(ball, depsgraph)), change.__name__
+
+
+def test_vertices_at_rest_are_checked_once_for_all_poses(ball, monkeypatch):
+    """Poses are copies of the surface that was read first, so what they compute themselves is lost."""
+    surface, checked, real = scene.read_surface(ball, depsgraph_of(ball)), [], np.isfinite
+    monkeypatch.setattr(np, "isfinite", lambda values: checked.append(values) or real(values))
+    for amount in (1.1, 1.2, 1.3):
+        posed_strands.pose_of(surface.posed_at(np.float32(amount) * surface.rest))
+    assert sum(values is surface.rest for values in checked) == 1
 
 
 def test_poses_without_uvs_follow_all_other_changes(ball):
