@@ -70,7 +70,7 @@ def groups_of(keys):
 
 
 class Objects:
-    """The texture of the objects of a `Batch` that a picture shows, and their work groups.
+    """The texture of objects, of a `Batch` that a picture shows or of hair in shadow maps, and their work groups.
 
     records: (N,) of `drawing.strand_records`; layers: (N,), in shadow maps the map of each object; first_run: number of
     runs of segments before these objects; tints: (N, 3), None for white.
