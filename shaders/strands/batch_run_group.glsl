@@ -4,7 +4,9 @@
 
 int first_group(int row)
 {
-  return int(object_texel(row, GROUP_TEXEL)[walked_part]);
+  vec4 lower = object_texel(row, GROUP_TEXEL);
+  vec3 upper = vec3(object_texel(row, RUN_TEXEL).zw, lower.w);
+  return whole_number(vec2(upper[walked_part], lower[walked_part]));
 }
 
 int group_in_object(int group)

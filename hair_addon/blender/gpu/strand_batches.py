@@ -91,7 +91,8 @@ class Objects:
             rows[:, 8, channel] = records[name]
         rows[:, 9, :2], rows[:, 9, 2] = _halves(records["first_segment"]), layers
         rows[:, 10, :2] = _halves(first_run + np.cumsum(runs) - runs)
-        rows[:, 11, :3] = (np.cumsum(groups, axis=1) - groups).T
+        firsts = _halves((np.cumsum(groups, axis=1) - groups).T)  # (N, 3, 2)
+        rows[:, 10, 2:], rows[:, 11, 3], rows[:, 11, :3] = firsts[:, :2, 0], firsts[:, 2, 0], firsts[..., 1]
         rows[:, 12, :3] = 1.0 if tints is None else tints
         data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
         self.texture = gpu.types.GPUTexture((_TEXELS, len(texels)), format="RGBA32F", data=data)
@@ -129,5 +130,5 @@ def shared_objects(records: np.ndarray, layers: np.ndarray) -> Objects:
 
 
 def _halves(numbers):
-    """Return (N, 2) upper and lower 16 bits of (N,) integers."""
-    return np.stack([numbers >> 16, numbers & 0xFFFF], axis=1)
+    """Return (..., 2) upper and lower 16 bits of (...) integers: single precision has 24."""
+    return np.stack([numbers >> 16, numbers & 0xFFFF], axis=-1)
