@@ -380,13 +380,15 @@ def test_hair_is_placed_in_the_maps_of_all_lights_at_once(scene, rng, monkeypatc
         np.testing.assert_array_equal(records, shadows._records(many, view, to_world, drawing.Steps(), False))
 
 
-def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, rng, monkeypatch):
+# More than 65,536 work groups, a number of two parts in the table of objects, need 400,000 strands.
+@pytest.mark.parametrize("strand_count", [200, pytest.param(400_000, marks=pytest.mark.long)])
+def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, rng, monkeypatch, strand_count):
     """Maps of ten lights, of linked and uneven hair that casts shadows of some lights alone, have the same bits whether
     they are drawn together or one after the other.
     """
-    points, radii = tuft(rng, 200)
-    many, few = (strand_textures.upload_strands(points[:count], radii[:count]) for count in (200, 30))
-    places = np.diag([1.0, 1.0, 1.0, 1.0]), np.diag([0.4, -0.5, 0.4, 1.0]), np.diag([0.01, 0.02, 0.03, 1.0])
+    points, radii = tuft(rng, strand_count)
+    many, few = (strand_textures.upload_strands(points[:count], radii[:count]) for count in (strand_count, 30))
+    places = np.diag([0.01, 0.02, 0.03, 1.0]), np.diag([0.4, -0.5, 0.4, 1.0]), np.diag([1.0, 1.0, 1.0, 1.0])
     hair = [(strands, place) for place in places for strands in (many, few)]
     floor = np.float32([(-1.0, -1.0, 0.1), (1.0, -1.0, 0.1), (0.0, 1.0, 0.1)])
     surfaces = [surface_textures.upload_surface(floor, np.int32([[0, 1, 2]]))]
@@ -401,7 +403,14 @@ def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, r
         monkeypatch.setattr(uniforms, "MAP_CAPACITY", most)
         maps, record = shadows.ShadowMaps(48, 10, in_compute=True), lights.copy()
         some = [([], []), (hair[:1], surfaces), (hair[1:], []), (hair, surfaces)]
-        maps.draw(record, hair, surfaces, drawing.Steps(), lambda index, some=some: some[index % 4], counted=20)
+        maps.draw(
+            record,
+            hair,
+            surfaces,
+            drawing.Steps(),
+            lambda index, some=some: some[index % 4],
+            counted=strand_count // 10,
+        )
         found.append(record)
         both = maps.samplers["hair_front"], maps.samplers["hair_layers"]
         textures.append([layer_of(texture, index) for texture in both for index in range(10)])
