@@ -402,7 +402,7 @@ def test_maps_of_lights_that_are_drawn_together_are_those_of_each_light(scene, r
     for most in (uniforms.MAP_CAPACITY, 1):
         monkeypatch.setattr(uniforms, "MAP_CAPACITY", most)
         maps, record = shadows.ShadowMaps(48, 10, in_compute=True), lights.copy()
-        some = [([], []), (hair[:1], surfaces), (hair[1:], []), (hair, surfaces)]
+        some = [([], []), (hair[4:5], surfaces), (hair[:4] + hair[5:], []), (hair, surfaces)]
         maps.draw(
             record,
             hair,
