@@ -104,7 +104,13 @@ def _follow_scene(reports, scene, depsgraph):
     if any(report.is_of(bpy.types.Scene) for report in reports):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
-    # Blender does not report a scene that was copied or deleted.
+    _repair_soon(scene)
+
+
+def _repair_soon(scene):
+    """Let a timer repair the compositing of a scene that was copied or lost its hair scene: Blender reports neither,
+    and a copy may be shown by a change of its frame alone.
+    """
     if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
         bpy.app.timers.register(composite.repair)
 
@@ -255,6 +261,7 @@ def after_frame_change(scene, depsgraph):
         frame_faces.note(deformed & _surfaces() - edited, depsgraph)
         for surface_object in deformed:
             events.surface_moved(surface_object)
+        _repair_soon(scene)
     if not scene_time.may_write(scene, depsgraph):
         unlocked_renders.note(scene)
         return
