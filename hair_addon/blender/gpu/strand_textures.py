@@ -314,7 +314,8 @@ def move_strands(strands, moved, points):
     )
     packed = np.empty((len(moved), texel_count, 2), np.float32)
     low, high = geometry.packed_strands.pack(points, packed)
-    box = strands.box.exact if strands.box.known is None else strands.box.known  # known of uploaded strands
+    # Uploaded strands, which a stroke moves in each event, have a known box: only that of made strands has to be read.
+    box = strands.box.exact if strands.box.known is None else strands.box.known
     np.minimum(box[0], low, out=box[0])
     np.maximum(box[1], high, out=box[1])
     texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
